@@ -30,6 +30,7 @@ from rigidimpulse.studies.work_precision import Study
 
 HERE = Path(__file__).resolve().parent
 NARROW_PHASES = DATA / "narrow_phases.csv"
+MIDDLE, PRESETS = DATA / "middle.csv", ("standard", "preview")
 GALLERY, HARD = DATA / "gallery_checks.csv", DATA / "hard_checks.csv"
 BENCH = ROOT / "tests" / "bench"
 TOSSES = BENCH / "tosses"
@@ -76,7 +77,7 @@ def page(title: str, *parts: str) -> str:
 
 def number(text: str | float) -> str:
     """A number for a table; a dash where there is none."""
-    return figure(float(text)) if text not in ("", None) else "-"
+    return "-" if text in ("", None) or math.isnan(float(text)) else figure(float(text))
 
 
 def check_rows(rows: Iterable[dict[str, str]]) -> list[tuple[str, ...]]:
@@ -351,7 +352,43 @@ def speed() -> str:
                 f"### `{scene}`\n",
                 table(("engine or setting", f"mean, {unit}", f"median, {unit}", "ratio", "overlap, mm", "at the end, mm", "note"), lines),
             ]
-    return page("Speed", *parts)
+    return page("Speed", *parts, *ladder())
+
+
+def ladder() -> list[str]:
+    """What presets and other engines cost in scenes of one to two hundred bodies, and how far off they are."""
+    rows = read(MIDDLE)
+    parts = [
+        "## From one body to two hundred\n\nScenes that people build first. Cost is processor time on one core for a second of motion: "
+        "of the whole call of `simulate` here, of the\n"
+        "steps alone in other engines, in steps of 1/240 s. Overlap is the deepest at any frame, of the size of the smaller body. The "
+        "ratio is to the fastest\n"
+        "other engine. Other engines take the hull of a concave mesh, so they are given the convex parts of it, in lines of their own.\n",
+        "![Overlap against cost, scene by scene](middle.png)\n",
+        origin(MIDDLE),
+    ]
+    for scene in dict.fromkeys(row["scene"] for row in rows):
+        here = [row for row in rows if row["scene"] == scene]
+        best = min((float(row["seconds"]) for row in here if row["what"] not in PRESETS), default=math.nan, key=_or_never)
+        lines = [
+            (
+                row["what"], number(row["seconds"]), _ratio(float(row["seconds"]), best), number(row["depth"]), number(row["gap"]),
+                row["status"],
+            )
+            for row in here
+        ]  # fmt: skip
+        columns = ("preset or engine", "s for 1 s", "ratio", "overlap", "gap of joints, m", "note")
+        parts += [f"### `{scene}`\n\n{here[0]['about']}\n", table(columns, lines)]
+    return parts
+
+
+def _or_never(seconds: float) -> float:
+    return math.inf if math.isnan(seconds) else seconds
+
+
+def _ratio(seconds: float, best: float) -> str:
+    """How many times as long as the best, or a dash."""
+    return "-" if math.isnan(seconds / best) else f"{seconds / best:.2g}"
 
 
 def length(text: str) -> str:

@@ -243,7 +243,11 @@ class Substepping(Protocol):
     """The sub-stepped islands of a run: `SubsteppedIslands`, or `NoSubstepping`. What follows `finish` is asked for such islands."""
 
     label: np.ndarray
-    solve_count: np.ndarray
+
+    @property
+    def solve_count(self) -> np.ndarray:
+        """How often the exact regime has dealt with each body in the step, (n,)."""
+        ...
 
     def choose(self, run: Any, pair_events: Any, /) -> None:
         """Choose the islands of the step."""

@@ -71,7 +71,7 @@ def pile_round(name: str, fall: int, engines: tuple[str, ...], clock: Callable[[
 def _pile_line(scene: ri.Scene, answer: EngineRun | str) -> Result:
     if isinstance(answer, str):
         return Result(np.nan, np.nan, note=answer)
-    frame = SimpleNamespace(positions=answer.position[None], orientations=answer.orientation[None])
+    frame = SimpleNamespace(positions=answer.position, orientations=answer.orientation)
     return Result(float(answer.times.mean()), float(np.median(answer.times)), last=_depth(scene, frame))
 
 
@@ -94,7 +94,7 @@ def flight_round(name: str, engines: tuple[str, ...]) -> dict[str, Result]:
             out[engine] = Result(np.nan, np.nan, note=answer)
         else:
             total = 1e-3 * float(answer.times.sum())
-            out[engine] = Result(total, total, note=_energy_error(scene, answer.velocity, answer.position))
+            out[engine] = Result(total, total, note=_energy_error(scene, answer.velocity, answer.position[-1]))
     return out
 
 

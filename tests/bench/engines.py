@@ -1,7 +1,7 @@
 """The same scene in other engines, for the benchmarks: MuJoCo, Bullet (`pip install '.[peers]'`), PhysX (`pip install sapien`) and Rapier's
 SIMD build (`npm install --prefix FOLDER @dimforge/rapier3d-simd-compat`, RAPIER=FOLDER/node_modules in the environment).
 
-Each gives the time of every step, ms of processor time (Rapier: wall clock of its own process), and the poses and velocities at the end.
+Each gives the time of every step, ms of processor time (Rapier: wall clock of its own process), poses on the way, and the last velocities.
 What is not installed is left out, with a word why.
 """
 
@@ -32,13 +32,26 @@ WALL, DEEP = 60.0, 2.0
 
 
 class EngineRun(NamedTuple):
-    """ms of each step, and body origins (n, 3), orientations (n, 4), velocities (n, 3) and spins (n, 3) after the last."""
+    """What an engine did with n bodies."""
 
-    times: np.ndarray
-    position: np.ndarray
-    orientation: np.ndarray
-    velocity: np.ndarray
-    spin: np.ndarray
+    times: np.ndarray  # (k,) ms of each step
+    position: np.ndarray  # (f, n, 3) m, body origins at frames, the last of them after the last step
+    orientation: np.ndarray  # (f, n, 4)
+    velocity: np.ndarray  # (n, 3) m/s, after the last step
+    spin: np.ndarray  # (n, 3) rad/s
+
+
+class Steps(NamedTuple):
+    """How an engine is run."""
+
+    step: float  # s
+    number: int
+    each: int  # steps from frame to frame
+    sleeping: bool = False
+
+    def is_frame(self, k: int) -> bool:
+        """Whether there is a frame after step k."""
+        return (self.number - 1 - k) % self.each == 0
 
 
 def use_cores(number: int) -> None:
@@ -47,32 +60,37 @@ def use_cores(number: int) -> None:
 
 
 def run_engines(
-    scene: Scene, step: float, steps: int, sleeping: bool = False, names: tuple[str, ...] = ENGINES
+    scene: Scene, step: float, steps: int, sleeping: bool = False, names: tuple[str, ...] = ENGINES, each: int | None = None
 ) -> dict[str, EngineRun | str]:
-    """Run a scene in the engines named, one after the other; a text says why one is left out."""
+    """Run a scene in the engines named, one after the other; a text says why one is left out.
+
+    each: steps from frame to frame; None: the last step is the only frame.
+    """
     engines: dict[str, Callable] = {"MuJoCo": _peer("mujoco"), "Bullet": _peer("pybullet"), "PhysX": _physx, "Rapier": _rapier}
     out: dict[str, EngineRun | str] = {}
     for name in names:
         try:
-            out[name] = engines[name](scene, step, steps, sleeping)
+            out[name] = engines[name](scene, Steps(step, steps, each or steps, sleeping))
         except (SceneError, ImportError, OSError) as error:
             out[name] = str(error).splitlines()[0]
     return out
 
 
 def _peer(name: str) -> Callable:
-    def run(scene: Scene, step: float, steps: int, sleeping: bool) -> EngineRun:
-        if sleeping:
+    def run(scene: Scene, steps: Steps) -> EngineRun:
+        if steps.sleeping:
             raise SceneError("its adapter lets no body sleep")
-        peer = load_peer(name, scene, step)
-        times = []
-        for _ in range(steps):
+        peer = load_peer(name, scene, steps.step)
+        times, states = [], []
+        for k in range(steps.number):
             start = process_time()
             peer.advance(1)
             times.append(1e3 * (process_time() - start))
-        position, orientation, velocity, spin, _ = peer.state()
+            if steps.is_frame(k):
+                states.append(peer.state())
         peer.close()
-        return EngineRun(np.array(times), position, orientation, velocity, spin)
+        position, orientation = (np.array([state[k] for state in states]) for k in range(2))
+        return EngineRun(np.array(times), position, orientation, *states[-1][2:4])
 
     return run
 
@@ -92,7 +110,7 @@ def _as_box(part: Part) -> Part:
     return Part(box, part.position + (offset - DEEP) * normal, np.column_stack([first, np.cross(normal, first), normal]))
 
 
-def _rapier(scene: Scene, step: float, steps: int, sleeping: bool) -> EngineRun:
+def _rapier(scene: Scene, steps: Steps) -> EngineRun:
     node, folder = shutil.which("node"), os.environ.get("RAPIER")
     if node is None or folder is None:
         raise OSError("Node, or RAPIER=.../node_modules in the environment, is missing")
@@ -100,7 +118,8 @@ def _rapier(scene: Scene, step: float, steps: int, sleeping: bool) -> EngineRun:
     if joints:
         raise SceneError("joints are not passed on to Rapier")
     data = {
-        "gravity": np.asarray(scene.gravity, float).tolist(), "step": step, "steps": steps, "sleeping": sleeping, "iterations": 4,
+        "gravity": np.asarray(scene.gravity, float).tolist(), "step": steps.step, "steps": steps.number, "each": steps.each,
+        "sleeping": steps.sleeping, "iterations": 4,
         "bodies": [_body_data(body) for body in bodies],
     }  # fmt: skip
     script = Path(__file__).with_name("rapier.mjs")
@@ -110,7 +129,7 @@ def _rapier(scene: Scene, step: float, steps: int, sleeping: bool) -> EngineRun:
         raise OSError(f"Rapier: {answer.stderr.strip().splitlines()[-1] if answer.stderr.strip() else 'no answer'}")
     out = json.loads(answer.stdout)
     poses, speeds = np.array(out["poses"]), np.array(out["speeds"])
-    return EngineRun(np.array(out["times"]), poses[:, :3], poses[:, 3:], speeds[:, :3], speeds[:, 3:])
+    return EngineRun(np.array(out["times"]), poses[..., :3], poses[..., 3:], speeds[:, :3], speeds[:, 3:])
 
 
 def _body_data(entry: PeerBody) -> dict[str, Any]:
@@ -138,7 +157,7 @@ def _part_data(part: Part) -> dict[str, Any]:
     raise SceneError(f"a {shape.kind} is not passed on to Rapier")
 
 
-def _physx(scene: Scene, step: float, steps: int, _sleeping: bool) -> EngineRun:
+def _physx(scene: Scene, steps: Steps) -> EngineRun:
     import warnings
 
     with warnings.catch_warnings():
@@ -154,19 +173,20 @@ def _physx(scene: Scene, step: float, steps: int, _sleeping: bool) -> EngineRun:
         raise SceneError("joints are not passed on to PhysX")
     system = physx.PhysxCpuSystem()
     world = sapien.Scene([system])
-    world.set_timestep(step)
+    world.set_timestep(steps.step)
     added = [_physx_body(sapien, physx, world, body) for body in bodies]
-    times = []
-    for _ in range(steps):
+    times, position, orientation = [], [], []
+    for k in range(steps.number):
         start = process_time()
         world.step()
         times.append(1e3 * (process_time() - start))
-    poses = [entity.pose for entity, _ in added]
+        if steps.is_frame(k):
+            poses = [entity.pose for entity, _ in added]
+            position.append([pose.p for pose in poses])
+            orientation.append([pose.q for pose in poses])
     speeds = [(c.linear_velocity, c.angular_velocity) if c is not None else (np.zeros(3), np.zeros(3)) for _, c in added]
-    return EngineRun(
-        np.array(times), np.array([pose.p for pose in poses]), np.array([pose.q for pose in poses]), np.array([v for v, _ in speeds]),
-        np.array([w for _, w in speeds]),
-    )  # fmt: skip
+    velocity, spin = (np.array([speed[k] for speed in speeds]) for k in range(2))
+    return EngineRun(np.array(times), np.array(position), np.array(orientation), velocity, spin)
 
 
 def _physx_body(sapien: Any, physx: Any, world: Any, entry: PeerBody) -> tuple[Any, Any]:

@@ -7,14 +7,16 @@ rings, dolls on stairs, a gyroscope, a chain with a weight, dominoes, a pendulum
 motion (median of the rounds; presets and engines take turns, so that other work hits all alike), the depth of bodies inside each other
 at frames that are chosen evenly, of the size of the smaller body, by the measure that runs end with (`engine.measure`), the widest gap of
 a joint, the growth of the energy of motion and place over an earlier frame, of the largest kinetic energy (not where a drive gives some),
-and the status. Other engines run in steps of 1/240 s; they give times only, for what they can load.
-With --save the lines go to tests/bench/<machine>/middle.csv.
+and the status. Other engines run in steps of 1/240 s what they can load: not concave meshes, of which they would take the hulls, but the
+same bodies in convex parts. Their depths and gaps are measured in the same way at the same frames; their time is that of the steps alone.
+With --save the lines go to docs/results/data/middle.csv, for the page of the results.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -25,23 +27,29 @@ from typing import NamedTuple
 import numpy as np
 import trimesh
 from bench_scenes import machine
-from engines import ENGINES, run_engines, use_cores
+from engines import ENGINES, EngineRun, run_engines, use_cores
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "docs" / "results"))
+
+from provenance import DATA, note
 
 import rigidimpulse as ri
-from rigidimpulse.core.quaternion import rotate
+from rigidimpulse.core.quaternion import multiply, rotate
 from rigidimpulse.engine.measure.measure import record_of_recording
 from rigidimpulse.engine.measure.overlap import overlap_depths
+from rigidimpulse.engine.measure.record import RunRecord
 
 HARD = ri.Material(density=1200, restitution=0.2, static_friction=0.4, dynamic_friction=0.4)
 SOFT = ri.Material(density=700, restitution=0.0, static_friction=0.5, dynamic_friction=0.5)
-PEER_STEP = 1.0 / 240.0
+PEER_STEP, PEER_STEPS = 1.0 / 240.0, 4
+"""Step of other engines, s, and how many of them there are from frame to frame."""
 
 
 class Line(NamedTuple):
     """What was measured of a scene at one preset, or in one engine."""
 
     scene: str
-    what: str
+    what: str  # preset or engine
     seconds: float  # of processor time for 1 s of motion
     depth: float  # of the size of the smaller body
     gap: float  # m, of joints
@@ -279,47 +287,76 @@ SCENES: dict[str, tuple[Callable[[], ri.Scene], float]] = {
 """Makers and durations, s."""
 
 
-def widest_gap(scene: ri.Scene, run: ri.Recording) -> float:
-    """How far the anchors of a joint are apart at most, at recorded frames, m; 0 without joints."""
-    widest, bodies = 0.0, {body.name: body for body in scene.bodies}
+BY_PARTS = frozenset({"concave_12", "concave_40", "rings"})
+"""Scenes of concave meshes, which other engines are given in convex parts."""
+
+
+class Poses(NamedTuple):
+    """Body origins (f, n, 3) m and orientations (f, n, 4) at frames, by whatever moved the bodies."""
+
+    position: np.ndarray
+    orientation: np.ndarray
+
+
+def widest_gap(scene: ri.Scene, poses: Poses) -> float:
+    """How far the anchors of a joint are apart at most, m; 0 without joints."""
+    widest, place = 0.0, {body.name: k for k, body in enumerate(scene.bodies)}
     for joint in scene.effects:
         anchor, ends = getattr(joint, "anchor", None), []
         if anchor is None:
             continue
         for name in (joint.a, joint.b):
             if name is None:
-                ends.append(np.broadcast_to(np.asarray(anchor, float), (len(run.times), 3)))
+                ends.append(np.broadcast_to(np.asarray(anchor, float), (len(poses.position), 3)))
                 continue
-            body = bodies[name]
+            body, k = scene.bodies[place[name]], place[name]
             inverse = np.asarray(body.orientation, float) * [1, -1, -1, -1]
             own = rotate(inverse, np.asarray(anchor, float) - body.position)
-            ends.append(run.position(name) + np.array([rotate(q, own) for q in run.orientation(name)]))
+            ends.append(poses.position[:, k] + np.array([rotate(q, own) for q in poses.orientation[:, k]]))
         widest = max(widest, float(np.linalg.norm(ends[0] - ends[1], axis=1).max()))
     return widest
 
 
-def measured(name: str, preset: str) -> Line:
+def deepest(record: RunRecord) -> float:
+    """How deep bodies are inside each other at most, of the size of the smaller one."""
+    depths = overlap_depths(record)
+    return float((depths.depth / depths.size).max(initial=0.0))
+
+
+def measured(name: str, preset: str) -> tuple[Line, RunRecord]:
     """Run a scene at a preset and measure it."""
     make, duration = SCENES[name]
     scene = make()
     start = process_time()
     run = ri.simulate(scene, duration, accuracy=preset)
-    seconds = (process_time() - start) / duration
-    depths = overlap_depths(record_of_recording(run))
+    seconds, record = (process_time() - start) / duration, record_of_recording(run)
     total = run.ledger.kinetic + run.ledger.potential
     gain = float((total - np.minimum.accumulate(total)).max() / max(float(run.ledger.kinetic.max()), 1e-300))
-    depth = float((depths.depth / depths.size).max(initial=0.0))
-    return Line(name, preset, seconds, depth, widest_gap(scene, run), gain, run.status.message.splitlines()[0])
+    gap = widest_gap(scene, Poses(run.positions, run.orientations))
+    return Line(name, preset, seconds, deepest(record), gap, gain, run.status.message.splitlines()[0]), record
 
 
-def others(name: str, engines: tuple[str, ...]) -> list[Line]:
-    """The same scene in other engines."""
+def others(name: str, record: RunRecord, engines: tuple[str, ...]) -> list[Line]:
+    """The same scene in other engines; record: of a run here, whose frames tell where to look."""
     make, duration = SCENES[name]
-    out = []
-    for engine, answer in run_engines(make(), PEER_STEP, round(duration / PEER_STEP), names=engines).items():
-        seconds = np.nan if isinstance(answer, str) else 1e-3 * float(answer.times.sum()) / duration
-        out.append(Line(name, engine, seconds, np.nan, np.nan, np.nan, answer if isinstance(answer, str) else ""))
+    scene, out = make(), []
+    answers = run_engines(scene, PEER_STEP, round(duration / PEER_STEP), names=engines, each=PEER_STEPS)
+    for engine, answer in answers.items():
+        if isinstance(answer, str):
+            out.append(Line(name, engine, np.nan, np.nan, np.nan, np.nan, answer))
+            continue
+        depth, gap = _errors(scene, record, answer)
+        out.append(Line(name, engine, 1e-3 * float(answer.times.sum()) / duration, depth, gap, np.nan, ""))
     return out
+
+
+def _errors(scene: ri.Scene, record: RunRecord, answer: EngineRun) -> tuple[float, float]:
+    """Depth and gap of what an engine did, as ours are measured."""
+    start = np.array([body.position for body in scene.bodies], float), np.array([body.unit_orientation() for body in scene.bodies])
+    position, orientation = (np.concatenate([a[None], b]) for a, b in zip(start, (answer.position, answer.orientation), strict=True))
+    centre = position + rotate(orientation, record.world.offset)
+    frames = record.frames._replace(position=centre, orientation=multiply(orientation, record.world.turn))
+    return deepest(replace(record, frames=frames)), widest_gap(scene, Poses(position, orientation))
 
 
 def show(lines: list[Line]) -> Line:
@@ -338,7 +375,7 @@ def main() -> None:
     parser.add_argument("--presets", default="standard,preview")
     parser.add_argument("--engines", default=",".join(ENGINES), help="others to run; none: ''")
     parser.add_argument("--rounds", type=int, default=1)
-    parser.add_argument("--save", action="store_true", help="write tests/bench/<machine>/middle.csv")
+    parser.add_argument("--save", action="store_true", help="write docs/results/data/middle.csv")
     options = parser.parse_args()
     use_cores(1)
     print(machine())
@@ -350,17 +387,22 @@ def main() -> None:
         rounds: dict[str, list[Line]] = {}
         for _ in range(options.rounds):
             here = [measured(name, preset) for preset in options.presets.split(",")]
-            here += others(name, tuple(options.engines.split(","))) if options.engines else []
-            for line in here:
+            found = [line for line, _ in here]
+            if options.engines and name not in BY_PARTS:
+                found += others(name, here[0][1], tuple(options.engines.split(",")))
+            for line in found:
                 rounds.setdefault(line.what, []).append(line)
         lines += [show(of_one) for of_one in rounds.values()]
     if options.save:
-        folder = Path(__file__).parent / machine()
-        folder.mkdir(exist_ok=True)
-        with (folder / "middle.csv").open("w", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(Line._fields)
-            writer.writerows(lines)
+        path = DATA / "middle.csv"
+        with path.open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows([("about", *Line._fields), *((_about(line.scene), *line) for line in lines)])
+        note(path, f"python tests/bench/middle.py --rounds {options.rounds} --save")
+
+
+def _about(name: str) -> str:
+    """The sentence that says what a scene shows."""
+    return (SCENES[name][0].__doc__ or "").splitlines()[0]
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-// A scene in Rapier (SIMD build, WASM): reads JSON from the standard input, writes the time of each step, ms, and the last poses.
+// A scene in Rapier (SIMD build, WASM): reads JSON from the standard input, writes the time of each step, ms, the poses at frames, and the last velocities.
 import { createRequire } from "node:module";
 import { readFileSync } from "node:fs";
 
@@ -33,16 +33,17 @@ for (const body of scene.bodies) {
     }
     bodies.push(added);
 }
-const times = [];
+const pose = (body) => {
+    const x = body.translation(), q = body.rotation();
+    return [x.x, x.y, x.z, q.w, q.x, q.y, q.z];
+};
+const times = [], poses = [];
 for (let k = 0; k < scene.steps; k++) {
     const start = performance.now();
     world.step();
     times.push(performance.now() - start);
+    if ((scene.steps - 1 - k) % scene.each === 0) poses.push(bodies.map(pose));
 }
-const poses = bodies.map((b) => {
-    const x = b.translation(), q = b.rotation();
-    return [x.x, x.y, x.z, q.w, q.x, q.y, q.z];
-});
 const speeds = bodies.map((b) => {
     const v = b.linvel(), w = b.angvel();
     return [v.x, v.y, v.z, w.x, w.y, w.z];

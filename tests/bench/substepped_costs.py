@@ -93,7 +93,7 @@ def others() -> list[Point]:
             answers = run_engines(scene, step, round(time / step), names=PEERS)
             for name, answer in answers.items():
                 if not isinstance(answer, str):
-                    frame = SimpleNamespace(positions=answer.position[None], orientations=answer.orientation[None])
+                    frame = SimpleNamespace(positions=answer.position, orientations=answer.orientation)
                     deep.setdefault(name, []).append(float(depths(scene, frame, 0).max(initial=0.0)))
         for name, found in deep.items():
             taken = answers[name].times / (step * FPS)

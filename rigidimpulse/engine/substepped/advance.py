@@ -27,12 +27,10 @@ from rigidimpulse.engine.exact.advance import NOT_HELD
 from rigidimpulse.engine.exact.energy_limit import note_end_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work, begin_trajectory
 from rigidimpulse.engine.pair_events import PairEvents
-from rigidimpulse.engine.pair_table import NEVER, RUNAWAY, USED, most_solves
 from rigidimpulse.engine.participants import Substepping
 from rigidimpulse.engine.regime import (
     EXPENSIVE_TALL,
     FAST,
-    REBOUND,
     SPIN,
     TALL,
     crowded,
@@ -45,11 +43,11 @@ from rigidimpulse.engine.regime import (
     refusals,
     solves_in_islands,
     support_levels,
-    unlike,
 )
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.sleeping import advance_sleep_timers, wake_by_contact
 from rigidimpulse.engine.substepped.contact_forces import COARSE, FINE, FINEST, ContactStepper, Fineness, Outcome, joined_outcomes
+from rigidimpulse.engine.substepped.hand_over import HandOver
 from rigidimpulse.engine.substepped.jointed import JointedStepper
 from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
@@ -67,17 +65,8 @@ LEAVING = 0.1
 """Part of its speed at which a fast body must leave an island that it has hit to be no part of it."""
 MOST_PIECES = 4
 """Parts of what is stepped at once, between which trajectories begin again."""
-OF_MEAN = 0.125
-"""Part of the mean number of solves that each step is, for bodies with joints."""
-MOST_REBOUNDS = 30000.0
-"""Times in a step that bodies which rebound by more than REBOUND may be dealt with beyond RUNAWAY: about a second of the compiled loop."""
-MOST_UNLIKE = 6000.0
-"""The same for neighbours of unlike masses (`regime.unlike`), over the number of bodies of their island, since each time deals with all of
-them: a load that presses a light tilted disc flat needs hundreds."""
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the island that comes near it."""
-HANDED = "exact contact cost more than it advanced: sub-steps hold these bodies, which may sink in by a skin, 0.8 % of the inner radius"
-
 
 class _Began(NamedTuple):
     """The step that an island is in."""
@@ -99,7 +88,7 @@ class SubsteppedIslands:
         label: (n,) the island that a body belongs to, -1 for none; sleeping ones keep theirs.
         sleep_timer: (n,) s, for how long a member has hardly moved.
         asleep: (n,) bool, members that stand still while others of their island move.
-        solve_count: (n,) how often the exact solver has dealt with each body in the step.
+        hand_over: which exact islands come to sub-steps in the middle of a step.
 
     """
 
@@ -123,13 +112,10 @@ class SubsteppedIslands:
         self._stood = np.full((world.num_bodies, 7), np.inf)
         self._taken = np.zeros(world.num_bodies, bool)
         self._auto = solver == "auto"
-        self._cheapest = CheapestRegime(jointed(world)) if solver == "cheapest" else None
         self._jointed = jointed(world)
+        self._cheapest = CheapestRegime(self._jointed) if solver == "cheapest" else None
+        self.hand_over = HandOver(world, self._jointed, self._cheapest)
         self._joint_stepper: JointedStepper | None = None
-        self._mean_solves, self._open = np.zeros(world.num_bodies), np.zeros(world.num_bodies, bool)
-        self._spared = np.zeros(world.num_bodies, bool)
-        self.solve_count, self._step_end = self._no_solves(), 0.0
-        self._handed: dict[tuple[str, ...], int] = {}
         self._ends: dict[int, float] = {}
         self._began: dict[int, _Began] = {}
         self._outcome: Outcome | None = None
@@ -143,17 +129,16 @@ class SubsteppedIslands:
         prepare_kernels(self._world, with_events=False, with_substepped=True)
         return ContactStepper(self._world, self._movable, self._parts, self._sharing)
 
-    def _no_solves(self) -> np.ndarray:
-        """Counts (n,) at the start of a step; nothing is handed over where everything is sub-stepped."""
-        return np.full(self._world.num_bodies, 0.0 if self._auto or self._cheapest else NEVER)
+    @property
+    def solve_count(self) -> np.ndarray:
+        """How often the exact regime has dealt with each body in the step, (n,)."""
+        return self.hand_over.solve_count
 
     def carry_on(self, earlier: Substepping, old: np.ndarray, new: np.ndarray) -> None:
         """Know of exact bodies `new` (k,) what an earlier run knew of them as `old` (k,)."""
         self.solve_count[new] = earlier.solve_count[old]
         if isinstance(earlier, SubsteppedIslands):
-            self._mean_solves[new], self._open[new] = earlier._mean_solves[old], earlier._open[old]
-            if self._cheapest is not None and earlier._cheapest is not None:
-                self._cheapest.carry_on(earlier._cheapest, old, new)
+            self.hand_over.carry_on(earlier.hand_over, old, new)
 
     def is_idle(self) -> bool:
         """Whether no island is sub-stepped and none may begin to be."""
@@ -168,34 +153,23 @@ class SubsteppedIslands:
         return self._auto and not may_begin(self._world, self._jointed, solve_count)
 
     def may_take(self, bodies: np.ndarray) -> bool:
-        """Whether islands of bodies that no impulse keeps apart are handed over; they are, when they are looked at next."""
-        mine = bodies[self._world.dynamic[bodies]]
-        if np.any(self.solve_count[mine] == NEVER) or self._open[mine].any():
-            return False
-        self.solve_count[mine] = np.inf
-        return True
+        """Whether islands of bodies that no impulse keeps apart are handed over, see `HandOver.may_take`."""
+        return self.hand_over.may_take(bodies)
 
     def summary(self) -> str:
         """What became of sub-stepped islands in the run."""
         refused = ", ".join(f"{reason} ({count})" for reason, count in sorted(self._refused.items()))
         text = f"{self._steps} steps, largest {self._most} bodies" if self._steps else "none"
-        if self._handed:
-            text += f", {sum(self._handed.values())} times handed over by the exact regime in the middle of a step"
+        if times := self.hand_over.times_handed_over():
+            text += f", {times} times handed over by the exact regime in the middle of a step"
         if self._joint_stepper is not None:
             text += f", {self._joint_stepper.halved} sub-steps halved so that joints close"
         return f"{text}; left to the exact regime, islands times steps: {refused}" if refused else text
 
     def choose(self, run: Run, pair_events: PairEvents) -> None:
         """Choose the islands of the step: `pair_events.inside` marks their bodies, `pair_events.asleep` the sleepers."""
-        last = np.maximum(self.solve_count, 0.0)
-        if pair_events.end > self._step_end:
-            self._mean_solves += OF_MEAN * (np.minimum(last, RUNAWAY) - self._mean_solves)
-            self._spared[:] = False
-            self.solve_count, self._step_end = self._no_solves(), pair_events.end
-        # One step with many events is no reason to leave the exact regime with a mechanism: it stays out of it for long.
-        solve_count = np.where(self._jointed & self._auto, self._mean_solves, last)
-        idle = self._is_idle(solve_count)
-        if idle:
+        solve_count = self.hand_over.begin_step(pair_events.end)
+        if self._is_idle(solve_count):
             return
         world, trajectory, time = run.world, run.state.trajectory, pair_events.begin
         ended = trajectory.mode == LINEAR
@@ -244,7 +218,7 @@ class SubsteppedIslands:
             refused = refusals(world, root, self.label >= 0, joined, moves, solve_count, (a, b), self._auto)
         inside = self.stepper.inside_others(run, member & (self.label >= 0) & np.isin(root, list(refused)))
         refused = {r: reason for r, reason in refused.items() if r not in root[inside]}
-        refused.update(dict.fromkeys(np.unique(root[member & self._open]).tolist(), "joints that sub-steps do not close"))
+        refused.update(dict.fromkeys(np.unique(root[member & self.hand_over.open]).tolist(), "joints that sub-steps do not close"))
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
         # Tall columns are found from contacts, so only in islands that are not refused yet.
         exempt = joined | (solves_in_islands(root, solve_count) > EXPENSIVE_TALL)[root] | crowded(root, a[touch > 0])[root]
@@ -403,15 +377,16 @@ class SubsteppedIslands:
 
     def join(self, run: Run, pair_events: PairEvents, time: float, islands: list[Island]) -> list[Island]:
         """The islands at `time` with the sub-stepped ones that they touch; at the start of a step all that are sub-stepped."""
-        for island in islands:
-            self.solve_count[island.members] += 1.0
+        self.hand_over.count(islands)
         if pair_events.end <= pair_events.begin:  # the end of the run: there is no time to step over
             return [island for island in islands if np.all(self.label[island.members] < 0)]
         for island in islands:
-            often = most_solves.py_func(len(island.members))
-            if np.any(self.solve_count[island.members] > often) and np.all(self.label[island.members] < 0):
-                self._hand_over(run, pair_events, island)
-        lost = self._lost(pair_events, islands)
+            exact = bool(np.all(self.label[island.members] < 0))
+            if exact and self.hand_over.runs_away(island) and self.hand_over.hands_over(run, pair_events, island):
+                self.label[island.members] = island.members.min()
+        lost = self.hand_over.lost(pair_events, islands, self.label < 0)
+        # One sub-stepped island from here on.
+        self.label[lost] = lost.min(initial=len(self.label))
         pair_events.inside[lost] = True
         first = not pair_events.substepped_begun
         pair_events.substepped_begun = True
@@ -433,53 +408,6 @@ class SubsteppedIslands:
         """Sub-stepped islands that some of the bodies are in."""
         labels = self.label[bodies]
         return labels[labels >= 0]
-
-    def _hand_over(self, run: Run, pair_events: PairEvents, island: Island) -> None:
-        """Let an exact island that runs away be sub-stepped from its instant on, and say so.
-
-        What bodies with paths of their own press on is not: if it is squeezed, sub-steps would shoot it out.
-        """
-        members, rebound = island.members, float(island.contacts.restitution.max(initial=0.0))
-        stuck, pressed = bool(np.isposinf(self.solve_count[members]).any()), bool(pair_events.pressed()[members].any())
-        # Many impacts are what some scenes are about. Where joints are, each takes a thousand times as long.
-        spared = self._cheapest is None and not stuck and not self._jointed[members].any() and not self._spared[members].all()
-        more = MOST_REBOUNDS if rebound > REBOUND else MOST_UNLIKE / len(members) if self._is_unlike(run, pair_events, members) else 0.0
-        if spared and more > 0.0:
-            self._spared[members], self.solve_count[members] = True, -more
-            return
-        if pressed or self._open[members].any():
-            # Looked at, and left to the exact regime until the end of the step.
-            self.solve_count[members] = NEVER
-            if pressed and stuck:
-                pair_events.report_squeezed(island)
-            return
-        self.solve_count[members] = 0.0
-        if self._cheapest is not None:
-            self._cheapest.handed_over(members, RUNAWAY)
-        self.label[members] = members.min()
-        names = tuple(run.world.names[i] for i in members.tolist())
-        if names not in self._handed:
-            run.log.note(island.time, "handed to sub-steps", names, HANDED)
-        self._handed[names] = self._handed.get(names, 0) + 1
-
-    def _is_unlike(self, run: Run, pair_events: PairEvents, members: np.ndarray) -> bool:
-        """Whether members met something in this step that is too unlike them in mass for sub-steps."""
-        pairs = pair_events.table.pairs[: pair_events.table.number[USED]]
-        a, b = pairs["a"], pairs["b"]
-        met = (np.isin(a, members) | np.isin(b, members)) & (self.solve_count[a] != 0.0) & (self.solve_count[b] != 0.0)
-        return bool(unlike(run.world, a[met], b[met]).any())
-
-    def _lost(self, pair_events: PairEvents, islands: list[Island]) -> np.ndarray:
-        """Bodies that no impulse keeps apart and whose contacts the exact regime does not see: one sub-stepped island from here on."""
-        lost = np.flatnonzero(np.isposinf(self.solve_count) & (self.label < 0))
-        if not len(lost):
-            return lost
-        for island in islands:
-            lost = np.setdiff1d(lost, island.members)
-        self.solve_count[lost] = NEVER
-        lost = lost[~pair_events.pressed()[lost]]
-        self.label[lost] = lost.min(initial=len(self.label))
-        return lost
 
     def _due(self, pair_events: PairEvents, time: float) -> np.ndarray:
         """Members whose trajectories end at `time`."""
@@ -542,8 +470,8 @@ class SubsteppedIslands:
 
     def _give_back(self, run: Run, pair_events: PairEvents, members: np.ndarray, time: float) -> None:
         """Let the exact regime go on with an island whose joints no sub-steps close, from `time` on and until the end of the run."""
-        self.label[members], self._taken[members], self._open[members] = -1, False, True
-        self.solve_count[members] = NEVER
+        self.label[members], self._taken[members] = -1, False
+        self.hand_over.leave(members)
         pair_events.inside[members] = False
         for i in members.tolist():
             begin_trajectory(run, pair_events, i, time, NOT_HELD, rests=False)
