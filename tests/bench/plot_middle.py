@@ -31,7 +31,7 @@ def main() -> None:
         rows = [row for row in csv.DictReader(file) if not math.isnan(float(row["seconds"]))]
     scenes = list(dict.fromkeys(row["scene"].removesuffix(PARTS) for row in rows))
     figure, grid = plt.subplots(
-        -(-len(scenes) // ACROSS), ACROSS, figsize=(12.0, 2.5 * -(-len(scenes) // ACROSS)), dpi=110, sharey=True, layout="constrained"
+        -(-len(scenes) // ACROSS), ACROSS, figsize=(12.0, 2.5 * -(-len(scenes) // ACROSS)), dpi=100, sharey=True, layout="constrained"
     )
     for axes, scene in zip(grid.flat, scenes, strict=False):
         for row in (row for row in rows if row["scene"].removesuffix(PARTS) == scene):
