@@ -53,6 +53,9 @@ class NoJoints:
         """No joint moves."""
         return NONE
 
+    def report_start(self, _run: Any) -> None:
+        """No joint is open."""
+
     def carry_on(self, _run: Any, _earlier: Any) -> None:
         """No joint goes on."""
 

@@ -57,7 +57,9 @@ def begin_run(world: World, plan: Plan, times: np.ndarray, left_out: Mapping[str
     for name, reason in left_out.items():
         run.log.report(0.0, "effect left out", (name,), f"the scene calls for it: {reason}")
     resolve_overlaps(run)
-    if earlier is not None:
+    if earlier is None:
+        run.joints.report_start(run)
+    else:
         # After it: what is moved apart does not go on as it was.
         earlier.carry_on(run)
     _bind_observers(run)

@@ -96,6 +96,10 @@ class RunJoints(Protocol):
         """Forces on b from here on, while the island sleeps."""
         ...
 
+    def report_start(self, run: Any, /) -> None:
+        """Report joints that the poses of the scene do not close."""
+        ...
+
     def report_open(self, run: Any, island: Island, /) -> None:
         """Report joints of an island that the forces found last do not close."""
         ...

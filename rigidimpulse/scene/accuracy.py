@@ -1,29 +1,4 @@
-"""Accuracy: one named strategy for each slot, and the presets, which are nothing but named values.
-
-Slots
-    impact_time     how the first contact in an interval is found (stage sweep)
-    response        how impulses are computed (stage respond); "penalty": none are, springs push bodies apart that are inside each other,
-                    with penalty_stiffness [N/m] and penalty_damping [N s/m] at every point that is inside; None: from weights, speeds
-                    and restitutions, see docs/theory/penalty.md
-    narrow_phase    who finds contacts and measures gaps: "exact": own manifolds; "fcl": FCL's contact points and normals for pairs of
-                    meshes, boxes and hulls, and time is backed up by bisection on FCL's gaps; own manifolds for pairs with a half
-                    space, a sphere, a capsule or a cylinder, where surfaces meet, and in sub-stepped islands
-    restitution     law that ends an impact: "newton" (speeds), "poisson" (impulses), "energetic" (works; Stronge), or "auto":
-                    energetic where a contact has friction, Newton's where it has none. They differ only with friction, and
-                    there where the contact couples normal and tangential motion (see dynamics/impact/restitution.py)
-    integrator      how bodies move between impacts (stage integrate): "exact" (forces that vary: steps of order 4, as long as their error
-                    allows), or in steps of one length, where forces vary and nothing collides by impulses: "runge_kutta" (of order 4),
-                    "semi_implicit" (Euler's, of order 1)
-    contact_solver  how lasting contacts are solved (stage constrain): "newton" (exact), "substepped" (soft, for large islands:
-                    see docs/theory/sub_stepping.md), "qp" (the exact laws by a convex solver library: a reference), "auto":
-                    newton, and sub-stepped for large islands of bodies that may touch in a step, or "cheapest": newton, and
-                    sub-stepped where that takes less time
-    substep_motion  how far touching bodies of a sub-stepped island may move past each other until their contacts are searched
-                    again, as a fraction of the distance from the centre of mass to the nearest face
-    step            s; contact forces are constant over it, impacts are found inside it at any time
-    tolerance       gap error at an impact, as a fraction of the size of the smaller body
-    iterations      limit of gap queries for one pair and one interval
-"""
+"""Accuracy: one named strategy for each slot, and the presets, which are nothing but named values."""
 
 from __future__ import annotations
 
@@ -31,11 +6,35 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.errors import SceneError, unknown_name
 
 
 class Accuracy(BaseModel):
-    """Settings of a run; see the module's head for the slots.
+    """Settings of a run.
+
+    Attributes:
+        impact_time: how the first contact in an interval is found (stage sweep).
+        response: how impulses are computed (stage respond); "penalty": none are, springs push bodies apart that are inside each
+            other, with penalty_stiffness [N/m] and penalty_damping [N s/m] at every point that is inside; None: from weights,
+            speeds and restitutions, see docs/theory/penalty.md.
+        narrow_phase: who finds contacts and measures gaps: "exact": own manifolds; "fcl": FCL's contact points and normals for
+            pairs of meshes, boxes and hulls, and time is backed up by bisection on FCL's gaps; own manifolds for pairs with a half
+            space, a sphere, a capsule or a cylinder, where surfaces meet, and in sub-stepped islands.
+        restitution: law that ends an impact: "newton" (speeds), "poisson" (impulses), "energetic" (works; Stronge), or "auto":
+            energetic where a contact has friction, Newton's where it has none. They differ only with friction, and there where the
+            contact couples normal and tangential motion (see dynamics/impact/restitution.py).
+        integrator: how bodies move between impacts (stage integrate): "exact" (forces that vary: steps of order 4, as long as their
+            error allows), or in steps of one length, where forces vary and nothing collides by impulses: "runge_kutta" (of order
+            4), "semi_implicit" (Euler's, of order 1).
+        contact_solver: how lasting contacts are solved (stage constrain): "newton" (exact), "substepped" (soft, for large islands:
+            see docs/theory/sub_stepping.md), "qp" (the exact laws by a convex solver library: a reference), "auto": newton, and
+            sub-stepped for large islands of bodies that may touch in a step, or "cheapest": newton, and sub-stepped where that
+            takes less time.
+        substep_motion: how far touching bodies of a sub-stepped island may move past each other until their contacts are searched
+            again, as a fraction of the distance from the centre of mass to the nearest face.
+        step: s; contact forces are constant over it, impacts are found inside it at any time.
+        tolerance: gap error at an impact, as a fraction of the size of the smaller body.
+        iterations: limit of gap queries for one pair and one interval.
 
     Example:
         >>> Accuracy(impact_time="conservative", step=1 / 120).response
@@ -74,6 +73,9 @@ class Accuracy(BaseModel):
         try:
             super().__init__(**settings)
         except ValidationError as error:
+            unknown = [e["loc"][0] for e in error.errors() if e["type"] == "extra_forbidden"]
+            if unknown:
+                raise unknown_name("setting", unknown[0], type(self).model_fields, "accuracy") from None
             lines = [f"accuracy: {_named(e)}: {e['msg'].removeprefix('Value error, ')}" for e in error.errors()]
             raise SceneError("\n".join(lines)) from None
 

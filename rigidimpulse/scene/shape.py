@@ -375,7 +375,8 @@ def check_orientation(quaternion: np.ndarray, where: str = "") -> None:
     if quaternion.shape != (4,) or not np.all(np.isfinite(quaternion)) or not np.any(quaternion):
         raise SceneError(
             f"orientation is {quaternion.tolist()}",
-            "give a quaternion (w, x, y, z) of four finite numbers, not all zero; (1, 0, 0, 0) is no rotation",
+            "give a quaternion (w, x, y, z) of four finite numbers, not all zero; (1, 0, 0, 0) turns nothing. Of angles: "
+            "scipy's Rotation.from_euler('xyz', angles).as_quat(scalar_first=True)",
             where,
         )
 

@@ -13,9 +13,10 @@ from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.joint_impact import JointBlock, impact_rows, stop_at_limits
 from rigidimpulse.dynamics.constraints.joint_limits import next_switch
-from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, hold_jointed, stop_joints
+from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, fill_closing_rows, hold_jointed, stop_joints
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, make_memory
 from rigidimpulse.dynamics.constraints.rolling_friction import Rolling
+from rigidimpulse.dynamics.constraints.rows import make_rows
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work
 from rigidimpulse.engine.islands import is_alone
@@ -26,12 +27,14 @@ from rigidimpulse.model.contacts import Contacts, select
 from rigidimpulse.model.island import Island, island_without_contacts
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
-from rigidimpulse.motion.evaluate import refresh_pose
+from rigidimpulse.motion.evaluate import bring_all, refresh_pose
 from rigidimpulse.motion.trajectory import FIXED
 from rigidimpulse.scene.fastening import fastening
 from rigidimpulse.scene.joint import Joint
 from rigidimpulse.scene.joint_coordinates import DISTANCE, RADIUS
 
+BEYOND = TOLERANCES.sub_stepping.joints_open
+"""By how much joints may be beyond a limit at the start, of the size of what they join, until that is reported."""
 TURN = 0.02
 """rad, how far the bodies of a joint may turn against each other in a sub-step."""
 SWAY = 0.7
@@ -455,6 +458,28 @@ class JointState:
         self.pull[island.joints] = 0.0
         for j in island.joints.tolist():
             self.memory.force[self.table.first[j] : self.table.first[j + 1]] = 0.0
+
+    def report_start(self, run: Run) -> None:
+        """Report joints that the scene places beyond their limits: bodies jump there in the first step."""
+        state, table, members = run.state, self.table, np.flatnonzero(run.world.dynamic)
+        # 1 of a hard lower limit, -1 of an upper one.
+        side = 1.0 * ((table.lower == 0.0) & np.isposinf(table.upper)) - 1.0 * ((table.upper == 0.0) & np.isneginf(table.lower))
+        side[np.isfinite(table.stiffness)] = 0.0
+        limited = np.unique(self._joint_of_row[side != 0.0])
+        ends = np.union1d(table.body_a[limited], table.body_b[limited])
+        bring_all(state.trajectory, ends[ends >= 0], state.time, state.now, state.rotation, run.acceleration, run.angular_acceleration)
+        for j in limited.tolist():
+            mine = slice(int(table.first[j]), int(table.first[j + 1]))
+            island = JointedIsland(table, np.array([j]), state.now, state.rotation, members, run.column, self.memory, self._allowed)
+            rows = make_rows.py_func(mine.stop - mine.start)
+            fill_closing_rows(island, rows, 0)
+            beyond = float(np.max(-side[mine] * rows.bias))
+            if beyond > BEYOND * run.world.joint_size:
+                run.log.report(
+                    state.time, "joint beyond its limit at the start", tuple(run.world.names[i] for i in self.bodies_of(np.array([j]))),
+                    f"{self.names[j]} is {beyond:.4g} (m or rad) beyond a limit; its bodies are moved there before the first step, without "
+                    "a change of velocity: place them within the limits to see no jump",
+                )  # fmt: skip
 
     def report_open(self, run: Run, island: Island) -> None:
         """Report joints of an island that the forces found last do not close."""

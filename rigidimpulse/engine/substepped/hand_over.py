@@ -62,7 +62,7 @@ class HandOver:
             self.cheapest.carry_on(earlier.cheapest, old, new)
 
     def begin_step(self, end: float) -> np.ndarray:
-        """Count from nought in the step that ends at `end`; returns the counts (n,) of earlier steps that islands of this one are judged by."""
+        """Count from nought in the step that ends at `end`; returns the counts (n,) before, by which its islands are judged."""
         last = np.maximum(self.solve_count, 0.0)
         if end > self._step_end:
             self._mean_solves += OF_MEAN * (np.minimum(last, RUNAWAY) - self._mean_solves)
