@@ -363,7 +363,8 @@ def ladder() -> list[str]:
         "of the whole call of `simulate` here, of the\n"
         "steps alone in other engines, in steps of 1/240 s. Overlap is the deepest at any frame, of the size of the smaller body. The "
         "ratio is to the fastest\n"
-        "other engine. Other engines take the hull of a concave mesh, so they are given the convex parts of it, in lines of their own.\n",
+        "other engine. Other engines take the hull of a concave mesh, so they are given the convex parts of it, in lines of their own.\n"
+        "An overlap above 1 is a body that went through another.\n",
         "![Overlap against cost, scene by scene](middle.png)\n",
         origin(MIDDLE),
     ]

@@ -12,7 +12,7 @@ from rigidimpulse.core.portable import dot, length
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.joint_impact import JointBlock, impact_rows, stop_at_limits
-from rigidimpulse.dynamics.constraints.joint_limits import next_switch
+from rigidimpulse.dynamics.constraints.joint_limits import limit_side, next_switch
 from rigidimpulse.dynamics.constraints.joint_sub_step import close_joints, fill_closing_rows, hold_jointed, stop_joints
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, make_memory
 from rigidimpulse.dynamics.constraints.rolling_friction import Rolling
@@ -461,19 +461,16 @@ class JointState:
 
     def report_start(self, run: Run) -> None:
         """Report joints that the scene places beyond their limits: bodies jump there in the first step."""
-        state, table, members = run.state, self.table, np.flatnonzero(run.world.dynamic)
-        # 1 of a hard lower limit, -1 of an upper one.
-        side = 1.0 * ((table.lower == 0.0) & np.isposinf(table.upper)) - 1.0 * ((table.upper == 0.0) & np.isneginf(table.lower))
-        side[np.isfinite(table.stiffness)] = 0.0
-        limited = np.unique(self._joint_of_row[side != 0.0])
+        state, table, members, limited = run.state, self.table, np.flatnonzero(run.world.dynamic), np.flatnonzero(self._has_limit)
         ends = np.union1d(table.body_a[limited], table.body_b[limited])
         bring_all(state.trajectory, ends[ends >= 0], state.time, state.now, state.rotation, run.acceleration, run.angular_acceleration)
         for j in limited.tolist():
-            mine = slice(int(table.first[j]), int(table.first[j + 1]))
+            mine = range(int(table.first[j]), int(table.first[j + 1]))
             island = JointedIsland(table, np.array([j]), state.now, state.rotation, members, run.column, self.memory, self._allowed)
-            rows = make_rows.py_func(mine.stop - mine.start)
+            rows = make_rows.py_func(len(mine))
             fill_closing_rows(island, rows, 0)
-            beyond = float(np.max(-side[mine] * rows.bias))
+            past = [-limit_side.py_func(table, k) * x for k, x in zip(mine, rows.bias.tolist(), strict=True)]
+            beyond = max((x for x, k in zip(past, mine, strict=True) if np.isinf(table.stiffness[k])), default=0.0)
             if beyond > BEYOND * run.world.joint_size:
                 run.log.report(
                     state.time, "joint beyond its limit at the start", tuple(run.world.names[i] for i in self.bodies_of(np.array([j]))),

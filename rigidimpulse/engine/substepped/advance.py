@@ -113,8 +113,7 @@ class SubsteppedIslands:
         self._taken = np.zeros(world.num_bodies, bool)
         self._auto = solver == "auto"
         self._jointed = jointed(world)
-        self._cheapest = CheapestRegime(self._jointed) if solver == "cheapest" else None
-        self.hand_over = HandOver(world, self._jointed, self._cheapest)
+        self.hand_over = HandOver(world, self._jointed, CheapestRegime(self._jointed) if solver == "cheapest" else None)
         self._joint_stepper: JointedStepper | None = None
         self._ends: dict[int, float] = {}
         self._began: dict[int, _Began] = {}
@@ -148,8 +147,8 @@ class SubsteppedIslands:
         """The same for these counts (n,) of solves in the last step."""
         if np.any(self.label >= 0):
             return False
-        if self._cheapest is not None:
-            return not self._cheapest.may_begin(solve_count, int(np.count_nonzero(self._world.dynamic)), self._jointed)
+        if self.hand_over.cheapest is not None:
+            return not self.hand_over.cheapest.may_begin(solve_count, int(np.count_nonzero(self._world.dynamic)), self._jointed)
         return self._auto and not may_begin(self._world, self._jointed, solve_count)
 
     def may_take(self, bodies: np.ndarray) -> bool:
@@ -210,10 +209,10 @@ class SubsteppedIslands:
         moves = lively(run.state.now, world.steady_strength, self.stepper.inner)
         joined = np.zeros_like(member)
         joined[run.joints.bodies_of(run.joints.at(np.flatnonzero(member & self._jointed)))] = True
-        if self._cheapest is not None:
+        if self.hand_over.cheapest is not None:
             touches = np.zeros(world.num_bodies, bool)
             touches[np.where(root[a] >= 0, root[a], root[b])] = True
-            refused = self._cheapest.refusals(root, self.label >= 0, joined, touches, solve_count)
+            refused = self.hand_over.cheapest.refusals(root, self.label >= 0, joined, touches, solve_count)
         else:
             refused = refusals(world, root, self.label >= 0, joined, moves, solve_count, (a, b), self._auto)
         inside = self.stepper.inside_others(run, member & (self.label >= 0) & np.isin(root, list(refused)))
@@ -499,8 +498,8 @@ class SubsteppedIslands:
                 change = mechanical_energy(run.state.now, run.world.constants, members) - before
                 run.log.account(time, "position correction", change)
             out = self.stepper.step(run, time, end)
-        if self._cheapest is not None:
-            self._cheapest.note(members, self.stepper.parts)
+        if self.hand_over.cheapest is not None:
+            self.hand_over.cheapest.note(members, self.stepper.parts)
         if out is None:
             return None
         amounts = np.zeros((3, run.world.num_bodies))
