@@ -44,19 +44,71 @@ def splits_first(low_a, high_a, low_b, high_b):
 
 
 @inner
-def gather_leaf_pairs(node_min, node_max, node_child, R, t, skeleton, pairs, depth):
-    """Walk on from the stack in rows [0, depth) of `pairs`, for boxes within the distance `skeleton`.
+def _normals_oppose(cone, a, b, R):
+    """Whether some n may be in the cone of node a with -n in that of node b, turned by R; cone: see `normal_cones`."""
+    between = 0.0
+    for i in range(3):
+        between -= cone[a, i] * (R[i, 0] * cone[b, 0] + R[i, 1] * cone[b, 1] + R[i, 2] * cone[b, 2])
+    cosine = cone[a, 3] * cone[b, 3] - cone[a, 4] * cone[b, 4]
+    # Two half angles of more than a half circle together leave nothing out.
+    return between >= cosine or cone[a, 4] * cone[b, 3] + cone[a, 3] * cone[b, 4] <= 0.0
 
-    Returns (depth, end): what is left of the stack, and the pairs of leaves in rows [STACK_ROWS, end).
+
+@inner
+def _in_reach(geometry, a, b, R, t, reach, depth):
+    """Whether a point of node b may be at  p + g n,  -depth <= g <= reach,  for a point p of node a with a normal n of its cone, and back.
+
+    Each box is put into an upright box of the other's frame, as in `box_distance_squared`. Along each axis the way g n is bounded by the
+    least and the greatest component of the normals of the cone.
     """
-    end = STACK_ROWS
-    while depth > 0 and end < pairs.shape[0]:
-        depth -= 1
-        a = pairs[depth, 0]
-        b = pairs[depth, 1]
+    cone = geometry.node_cone
+    low_a, high_a = row(geometry.node_min, a), row(geometry.node_max, a)
+    low_b, high_b = row(geometry.node_min, b), row(geometry.node_max, b)
+    middle_a = (0.5 * (low_a[0] + high_a[0]), 0.5 * (low_a[1] + high_a[1]), 0.5 * (low_a[2] + high_a[2]))
+    half_a = (high_a[0] - middle_a[0], high_a[1] - middle_a[1], high_a[2] - middle_a[2])
+    middle_b = (0.5 * (low_b[0] + high_b[0]), 0.5 * (low_b[1] + high_b[1]), 0.5 * (low_b[2] + high_b[2]))
+    half_b = (high_b[0] - middle_b[0], high_b[1] - middle_b[1], high_b[2] - middle_b[2])
+    between = subtract(moved(R, t, middle_b), middle_a)
+    squared = 0.0
+    for k in range(3):
+        half = half_a[k] + (abs(R[k, 0]) * half_b[0] + abs(R[k, 1]) * half_b[1] + abs(R[k, 2]) * half_b[2])
+        if between[k] - half > reach * max(0.0, cone[a, 8 + k]) + depth or between[k] + half < reach * min(0.0, cone[a, 5 + k]) - depth:
+            return False
+        squared += max(0.0, abs(between[k]) - half) ** 2
+    if squared > reach * reach:
+        return False
+    squared = 0.0
+    for k in range(3):
+        along_k = -(R[0, k] * between[0] + R[1, k] * between[1] + R[2, k] * between[2])
+        half = half_b[k] + (abs(R[0, k]) * half_a[0] + abs(R[1, k]) * half_a[1] + abs(R[2, k]) * half_a[2])
+        if along_k - half > reach * max(0.0, cone[b, 8 + k]) + depth or along_k + half < reach * min(0.0, cone[b, 5 + k]) - depth:
+            return False
+        squared += max(0.0, abs(along_k) - half) ** 2
+    return squared <= reach * reach
+
+
+@inner
+def gather_leaf_pairs(geometry, R, t, reach, depth, any_normal, pairs, stacked):
+    """Walk on from the stack in rows [0, stacked) of `pairs`, for features at gaps from -depth to `reach`, m.
+
+    any_normal: keep all pairs of boxes within `reach`, those too that cannot touch by their normals. Returns (stacked, end, left out): what
+    is left of the stack, the pairs of leaves in rows [STACK_ROWS, end), and whether normals have left out boxes within `reach`.
+    """
+    node_min, node_max, node_child, cone = geometry.node_min, geometry.node_max, geometry.node_child, geometry.node_cone
+    end, left_out = STACK_ROWS, False
+    while stacked > 0 and end < pairs.shape[0]:
+        stacked -= 1
+        a = pairs[stacked, 0]
+        b = pairs[stacked, 1]
         low_a, high_a = row(node_min, a), row(node_max, a)
         low_b, high_b = row(node_min, b), row(node_max, b)
-        if box_distance_squared(low_a, high_a, low_b, high_b, R, t, skeleton * skeleton) > skeleton * skeleton:
+        by_normals = not any_normal and not (_normals_oppose(cone, a, b, R) and _in_reach(geometry, a, b, R, t, reach, depth))
+        if any_normal or (by_normals and not left_out):
+            far = box_distance_squared(low_a, high_a, low_b, high_b, R, t, reach * reach) > reach * reach
+            left_out = left_out or (by_normals and not far)
+            if far:
+                continue
+        if by_normals:
             continue
         child_a = node_child[a]
         child_b = node_child[b]
@@ -68,7 +120,7 @@ def gather_leaf_pairs(node_min, node_max, node_child, R, t, skeleton, pairs, dep
         # The longer box is split, so that both boxes shrink alike.
         split_first = child_b < 0 or (child_a >= 0 and splits_first(low_a, high_a, low_b, high_b))
         for side in range(2):
-            pairs[depth, 0] = child_a + 1 - side if split_first else a
-            pairs[depth, 1] = b if split_first else child_b + 1 - side
-            depth += 1
-    return depth, end
+            pairs[stacked, 0] = child_a + 1 - side if split_first else a
+            pairs[stacked, 1] = b if split_first else child_b + 1 - side
+            stacked += 1
+    return stacked, end, left_out

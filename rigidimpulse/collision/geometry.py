@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rigidimpulse.collision.normal_cones import Features, edge_cones, every_direction, node_cones, unit_vectors, vertex_cones
 from rigidimpulse.core.portable import dot, matmul
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.triangles import unique_edges
@@ -94,6 +95,8 @@ class Geometry(NamedTuple):
     triangle_normal: np.ndarray  # (T, 3) unit, outward; zeros for sphere and capsule
     triangle_edge: np.ndarray  # (T, 3) edge k joins vertices k and (k + 1) % 3; -1 for none
     triangle_owns: np.ndarray  # (T,) bits 0-2: owns vertex k; bits 3-5: owns edge k
+    touching_first: np.ndarray  # (T+1,)
+    touching: np.ndarray  # (F,) what a triangle owns that may touch: 2 * vertex for a corner, 2 * edge + 1 for an edge in sight
     edge: np.ndarray  # (E, 2)
     edge_normal: np.ndarray  # (E, 2, 3) normals of both faces; one face twice at a boundary; zeros for a capsule
     edge_kind: np.ndarray  # (E,) EDGE_HIDDEN, EDGE_CONVEX, EDGE_BOUNDARY, EDGE_CAPSULE
@@ -102,6 +105,7 @@ class Geometry(NamedTuple):
     node_child: np.ndarray  # (N,) left child, the right one is next to it; -1 for a leaf
     node_start: np.ndarray  # (N,) first triangle
     node_count: np.ndarray  # (N,) number of triangles
+    node_cone: np.ndarray  # (N, 11) of the normals with which it can touch, see `normal_cones.node_cones`
 
 
 class Shapes(NamedTuple):
@@ -131,6 +135,7 @@ class _Surface(NamedTuple):
     node_child: np.ndarray
     node_start: np.ndarray
     node_count: np.ndarray
+    node_cone: np.ndarray
 
 
 def build_geometry(shapes: Sequence[CompiledShape]) -> Geometry:
@@ -141,6 +146,12 @@ def build_geometry(shapes: Sequence[CompiledShape]) -> Geometry:
     triangle_first = _offsets([len(s.triangle) for s in surfaces])
     edge_first = _offsets([len(s.edge) for s in surfaces])
     node_first = _offsets([len(s.node_child) for s in surfaces])
+    vertex_corner = _join([s.vertex_corner for s in surfaces], (0,), np.bool_)
+    triangle = _join([s.triangle for s in surfaces], (0, 3), np.int64, vertex_first)
+    triangle_edge = _join([s.triangle_edge for s in surfaces], (0, 3), np.int64, edge_first)
+    triangle_owns = _join([s.triangle_owns for s in surfaces], (0,), np.int64)
+    edge_kind = _join([s.edge_kind for s in surfaces], (0,), np.int64)
+    touching_first, touching = _touching(triangle, triangle_edge, triangle_owns, vertex_corner, edge_kind)
     edge = _join([s.edge for s in surfaces], (0, 2), np.int64, vertex_first)
     vertex_edge_first, vertex_edge = _edges_around_vertices(edge, int(vertex_first[-1]))
     bounds = [_bounding_sphere(primitive) for primitive in primitives]
@@ -157,21 +168,24 @@ def build_geometry(shapes: Sequence[CompiledShape]) -> Geometry:
         edge_first=edge_first,
         node_first=node_first,
         vertex=_join([s.vertex for s in surfaces], (0, 3), np.float64),
-        vertex_corner=_join([s.vertex_corner for s in surfaces], (0,), np.bool_),
+        vertex_corner=vertex_corner,
         vertex_edge_first=vertex_edge_first,
         vertex_edge=vertex_edge,
-        triangle=_join([s.triangle for s in surfaces], (0, 3), np.int64, vertex_first),
+        triangle=triangle,
         triangle_normal=_join([s.triangle_normal for s in surfaces], (0, 3), np.float64),
-        triangle_edge=_join([s.triangle_edge for s in surfaces], (0, 3), np.int64, edge_first),
-        triangle_owns=_join([s.triangle_owns for s in surfaces], (0,), np.int64),
+        triangle_edge=triangle_edge,
+        triangle_owns=triangle_owns,
+        touching_first=touching_first,
+        touching=touching,
         edge=edge,
         edge_normal=_join([s.edge_normal for s in surfaces], (0, 2, 3), np.float64),
-        edge_kind=_join([s.edge_kind for s in surfaces], (0,), np.int64),
+        edge_kind=edge_kind,
         node_min=_join([s.node_min for s in surfaces], (0, 3), np.float64),
         node_max=_join([s.node_max for s in surfaces], (0, 3), np.float64),
         node_child=_join([s.node_child for s in surfaces], (0,), np.int64, node_first),
         node_start=_join([s.node_start for s in surfaces], (0,), np.int64, triangle_first),
         node_count=_join([s.node_count for s in surfaces], (0,), np.int64),
+        node_cone=_join([s.node_cone for s in surfaces], (0, 11), np.float64),
     )
 
 
@@ -231,7 +245,7 @@ def _surface(primitive: Primitive) -> _Surface:
     triangle = np.ascontiguousarray(faces[order])
     corners = vertex[triangle]
     area_vector = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    triangle_normal = _directions(area_vector)
+    triangle_normal = unit_vectors(area_vector)
     edge, edge_normal, edge_kind, triangle_edge, edge_owner, balanced = _edges(vertex, triangle, triangle_normal)
     # Each vertex and edge is owned by one triangle, so that a pair of features is visited once.
     _, vertex_owner = np.unique(triangle.ravel(), return_index=True)
@@ -240,7 +254,7 @@ def _surface(primitive: Primitive) -> _Surface:
     owns[edge_owner // 3, 3 + edge_owner % 3] = 1
     # A closed surface has a positive volume; turned inside out it encloses nothing.
     volume = float(np.sum((corners[:, 0] - vertex[0]) * area_vector))
-    return _Surface(
+    surface = _Surface(
         closed=balanced and volume > 0.0,
         vertex=vertex,
         vertex_corner=_corners(vertex, edge, edge_kind),
@@ -256,7 +270,25 @@ def _surface(primitive: Primitive) -> _Surface:
         node_child=nodes[2],
         node_start=nodes[3],
         node_count=nodes[4],
+        node_cone=every_direction(len(nodes[4])),
     )
+    # The back of what bounds no solid is outside too.
+    return surface._replace(node_cone=_cones(surface, owns)) if surface.closed else surface
+
+
+def _cones(surface: _Surface, owns: np.ndarray) -> np.ndarray:
+    """Return the cones (N, 11) of the nodes of a surface that bounds a solid; owns (t, 6): bits of `triangle_owns`."""
+    triangle, corner, num_vertices = surface.triangle, surface.vertex_corner, len(surface.vertex)
+    normals = np.repeat(surface.triangle_normal, 3, axis=0)
+    total = np.column_stack([np.bincount(triangle.ravel(), weights=normals[:, k], minlength=num_vertices) for k in range(3)])
+    vertex_axis = unit_vectors(total)
+    vertex_angle = np.where(corner, vertex_cones(surface.vertex, surface.edge, vertex_axis), -1.0)
+    kind = surface.edge_kind
+    edge_axis, edge_angle = edge_cones(surface.edge_normal, kind == EDGE_CONVEX, kind == EDGE_HIDDEN)
+    features = Features(
+        triangle, surface.triangle_edge, owns, surface.triangle_normal, vertex_axis, vertex_angle, edge_axis, edge_angle
+    )
+    return node_cones(features, surface.node_start, surface.node_child)
 
 
 def _curved_surface(primitive: Primitive) -> _Surface:
@@ -283,6 +315,7 @@ def _curved_surface(primitive: Primitive) -> _Surface:
         node_child=np.full(num_triangles, -1, dtype=np.int64),
         node_start=np.zeros(num_triangles, dtype=np.int64),
         node_count=np.ones(num_triangles, dtype=np.int64),
+        node_cone=every_direction(num_triangles),
     )
 
 
@@ -294,7 +327,7 @@ def _edges(
     first, last = edges.first, edges.last
     edge = np.column_stack([triangle.ravel()[first], np.roll(triangle, -1, axis=1).ravel()[first]])
     edge_normal = np.stack([normal[first // 3], normal[last // 3]], axis=1)
-    along = _directions(vertex[edge[:, 1]] - vertex[edge[:, 0]])
+    along = unit_vectors(vertex[edge[:, 1]] - vertex[edge[:, 0]])
     sine = np.sum(np.cross(edge_normal[:, 0], edge_normal[:, 1]) * along, axis=1)
     cosine = np.sum(edge_normal[:, 0] * edge_normal[:, 1], axis=1)
     # Two faces folded back to back (cosine near -1) are the rim of a sheet: it can touch, so it counts as convex.
@@ -307,13 +340,25 @@ def _edges(
 def _corners(vertex: np.ndarray, edge: np.ndarray, edge_kind: np.ndarray) -> np.ndarray:
     """Return the vertices (v,) bool that have an edge in sight and do not lie inside a straight crease."""
     seen = edge[edge_kind != EDGE_HIDDEN]
-    along = _directions(vertex[seen[:, 1]] - vertex[seen[:, 0]])
+    along = unit_vectors(vertex[seen[:, 1]] - vertex[seen[:, 0]])
     ends = seen.T.ravel()
     directions = np.concatenate([along, -along])
     degree = np.bincount(ends, minlength=len(vertex))
     total = np.column_stack([np.bincount(ends, weights=directions[:, k], minlength=len(vertex)) for k in range(3)])
     straight = (degree == 2) & (np.linalg.norm(total, axis=1) <= TOLERANCES.surface.flat_angle)
     return (degree > 0) & ~straight
+
+
+def _touching(
+    triangle: np.ndarray, triangle_edge: np.ndarray, owns: np.ndarray, vertex_corner: np.ndarray, edge_kind: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return, as offsets (T+1,) and a list, what each triangle owns that may touch (see `Geometry`); arguments as there."""
+    bits = owns[:, None] >> np.arange(6) & 1
+    corners = (bits[:, :3] > 0) & (vertex_corner[triangle] if len(vertex_corner) else False)
+    edges = (bits[:, 3:] > 0) & (edge_kind[triangle_edge] != EDGE_HIDDEN if len(edge_kind) else False)
+    there = np.stack([edges, corners], axis=2).reshape(-1, 6)
+    features = np.stack([2 * triangle_edge + 1, 2 * triangle], axis=2).reshape(-1, 6)
+    return _offsets(there.sum(axis=1)), features[there]
 
 
 def _box_tree(corners: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
@@ -366,12 +411,6 @@ def _edges_around_vertices(edge: np.ndarray, num_vertices: int) -> tuple[np.ndar
     """Return, as offsets and a list, the edges that end at each vertex."""
     ends = edge.ravel()
     return _offsets(np.bincount(ends, minlength=num_vertices)), np.argsort(ends, kind="stable") // 2
-
-
-def _directions(vectors: np.ndarray) -> np.ndarray:
-    """Return unit vectors (n, 3) along vectors; zero for those too short to have a direction."""
-    lengths = np.linalg.norm(vectors, axis=1)
-    return vectors / np.maximum(lengths, np.finfo(np.float64).tiny)[:, None]
 
 
 def _offsets(counts: ArrayLike) -> np.ndarray:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from rigidimpulse.collision.bvh import STACK_ROWS
 from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, arc_miss, edge_normals, inner
-from rigidimpulse.collision.geometry import EDGE_HIDDEN
 from rigidimpulse.collision.manifold.contact_points import (
     INSIDE,
     MERGE,
@@ -18,6 +17,7 @@ from rigidimpulse.collision.manifold.contact_points import (
     append_contact,
     outside_box,
 )
+from rigidimpulse.core.kernels import inlined
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import along, cross, dot, moved, row, subtract, turned
 
@@ -82,7 +82,7 @@ def _crossing(p, d, q, e, reach):
     return inside and distance <= reach, point_a, point_b, c, distance
 
 
-@inner
+@inlined
 def _crossing_contact(geometry, view, found, count, edges):
     """Append the contact of two edges if they cross (frame of the first body); returns the new count, and whether they are in reach."""
     p, d, q, e = edges.p, edges.d, edges.q, edges.e
@@ -123,7 +123,7 @@ def _overlap(p, d, q, e):
     return max(0.0, min(start, start + speed)), min(length, max(start, start + speed)), start, speed
 
 
-@inner
+@inlined
 def _parallel_contacts(geometry, view, found, count, edges):
     """Append both ends of the overlap of two nearly parallel edges of meshes (frame of the first body); returns as `_crossing_contact`."""
     edge, edge_a, edge_b = geometry.edge, edges.a, edges.b
@@ -167,28 +167,27 @@ def edge_contacts(geometry, view, pairs, end, found, count):
 
     Returns the new count, and whether any two edges are in reach.
     """
-    vertex, edge, kind = geometry.vertex, geometry.edge, geometry.edge_kind
-    owns, triangle_edge = geometry.triangle_owns, geometry.triangle_edge
+    vertex, edge, touching_first, touching = geometry.vertex, geometry.edge, geometry.touching_first, geometry.touching
     meshes, any_near = view.radius_v == 0.0 and view.radius_t == 0.0, False
     for pair in range(STACK_ROWS, end):
         a, b = pairs[pair, 0], pairs[pair, 1]
         low, high = row(geometry.node_min, a), row(geometry.node_max, a)
-        start_a, count_a = geometry.node_start[a], geometry.node_count[a]
-        start_b, count_b = geometry.node_start[b], geometry.node_count[b]
-        for j in range(3 * start_b, 3 * (start_b + count_b)):
-            edge_b = triangle_edge[j // 3, j % 3]
-            # Flat and concave edges touch no other edge; each edge is visited by its owner only.
-            if not owns[j // 3] >> (3 + j % 3) & 1 or kind[edge_b] == EDGE_HIDDEN:
+        start_a, start_b = geometry.node_start[a], geometry.node_start[b]
+        first_a, last_a = touching_first[start_a], touching_first[start_a + geometry.node_count[a]]
+        # Flat and concave edges touch no other edge; each edge is visited by its owner only.
+        for j in range(touching_first[start_b], touching_first[start_b + geometry.node_count[b]]):
+            if touching[j] % 2 == 0:
                 continue
+            edge_b = touching[j] // 2
             q = moved(view.R, view.t, row(vertex, edge[edge_b, 0]))
             q_end = moved(view.R, view.t, row(vertex, edge[edge_b, 1]))
             if outside_box(q, q_end, low, high, view.reach):
                 continue
             e = subtract(q_end, q)
-            for i in range(3 * start_a, 3 * (start_a + count_a)):
-                edge_a = triangle_edge[i // 3, i % 3]
-                if not owns[i // 3] >> (3 + i % 3) & 1 or kind[edge_a] == EDGE_HIDDEN:
+            for i in range(first_a, last_a):
+                if touching[i] % 2 == 0:
                     continue
+                edge_a = touching[i] // 2
                 p, p_end = row(vertex, edge[edge_a, 0]), row(vertex, edge[edge_a, 1])
                 least = (min(p[0], p_end[0]), min(p[1], p_end[1]), min(p[2], p_end[2]))
                 most = (max(p[0], p_end[0]), max(p[1], p_end[1]), max(p[2], p_end[2]))

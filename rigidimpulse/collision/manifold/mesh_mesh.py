@@ -18,7 +18,8 @@ Contacts that miss being locally closest by less than the margin are kept in two
 corners of faces that lie on each other and get the normal at the end of the arc, and capsules, whose contacts at both
 ends of a line are wanted though one end is a little farther away.
 
-Both box trees are walked at once; pairs of leaves are gathered in chunks, so that no scene needs a larger buffer.
+Both box trees are walked at once; pairs of leaves are gathered in chunks, so that no scene needs a larger buffer. Pairs of nodes whose
+normals cannot oppose each other are left out (see `normal_cones`), unless any normal is to pass.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from math import sqrt
 import numpy as np
 
 from rigidimpulse.collision.bvh import STACK_ROWS, gather_leaf_pairs
+from rigidimpulse.collision.distance.meshes import round_round_gap
 from rigidimpulse.collision.distance.simplices import CORNER, FACE_VERTEX, VERTEX_FACE, edge_normals, in_edge_arc, inner, over_triangle
 from rigidimpulse.collision.geometry import EDGE_HIDDEN
 from rigidimpulse.collision.manifold.contact_points import (
@@ -46,7 +48,7 @@ from rigidimpulse.collision.manifold.contact_points import (
     outside_box,
 )
 from rigidimpulse.collision.manifold.mesh_edges import edge_contacts
-from rigidimpulse.core.kernels import jit_making_arrays
+from rigidimpulse.core.kernels import inlined, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import along, dot, moved, row, subtract, turned
 
@@ -86,7 +88,7 @@ def _in_vertex_cone(geometry, corner, direction, slack, tolerance):
     return True
 
 
-@inner
+@inlined
 def _face_contact(geometry, view, found, count, vertex, p, triangle, height):
     """Append the contact of a vertex at `p`, `height` over the plane of a face, if it lies over the face."""
     a, b, c = (
@@ -124,33 +126,32 @@ def _face_contact(geometry, view, found, count, vertex, p, triangle, height):
 @inner
 def _face_contacts(geometry, view, pairs, end, found, count):
     """Append the contacts of the corners in one node of each pair with the faces in the other."""
-    vertex, triangle, owns = geometry.vertex, geometry.triangle, geometry.triangle_owns
+    vertex, triangle, touching_first, touching = geometry.vertex, geometry.triangle, geometry.touching_first, geometry.touching
     for pair in range(STACK_ROWS, end):
         node_v = pairs[pair, 1] if view.flipped else pairs[pair, 0]
         node_t = pairs[pair, 0] if view.flipped else pairs[pair, 1]
         low, high = row(geometry.node_min, node_t), row(geometry.node_max, node_t)
         start_t, count_t = geometry.node_start[node_t], geometry.node_count[node_t]
         start_v, count_v = geometry.node_start[node_v], geometry.node_count[node_v]
-        for owner in range(start_v, start_v + count_v):
-            for k in range(3):
-                corner = triangle[owner, k]
-                if not (owns[owner] >> k & 1 and geometry.vertex_corner[corner]):
+        for i in range(touching_first[start_v], touching_first[start_v + count_v]):
+            if touching[i] % 2 == 1:
+                continue
+            corner = touching[i] // 2
+            p = moved(view.R, view.t, row(vertex, corner))
+            if outside_box(p, p, low, high, view.reach):
+                continue
+            for face in range(start_t, start_t + count_t):
+                a = row(vertex, triangle[face, 0])
+                normal = row(geometry.triangle_normal, face)
+                height = dot(subtract(p, a), normal)
+                # A triangle with two equal corners is a segment or a point and has no face.
+                if height > view.skeleton or height < -view.reach or triangle[face, 1] == triangle[face, 2]:
                     continue
-                p = moved(view.R, view.t, row(vertex, corner))
-                if outside_box(p, p, low, high, view.reach):
-                    continue
-                for face in range(start_t, start_t + count_t):
-                    a = row(vertex, triangle[face, 0])
-                    normal = row(geometry.triangle_normal, face)
-                    height = dot(subtract(p, a), normal)
-                    # A triangle with two equal corners is a segment or a point and has no face.
-                    if height > view.skeleton or height < -view.reach or triangle[face, 1] == triangle[face, 2]:
-                        continue
-                    count = _face_contact(geometry, view, found, count, corner, p, face, height)
+                count = _face_contact(geometry, view, found, count, corner, p, face, height)
     return count
 
 
-@inner
+@inlined
 def _corner_contact(geometry, view, found, count, corner, p, touched):
     """Append the contact of a vertex at `p` with an edge or a vertex if it is locally closest.
 
@@ -192,44 +193,41 @@ def _corner_contacts(geometry, view, pairs, end, found, count):
 
     Returns the new count, and whether any two of these are in reach.
     """
-    vertex, triangle, owns, edge = geometry.vertex, geometry.triangle, geometry.triangle_owns, geometry.edge
+    vertex, edge, touching_first, touching = geometry.vertex, geometry.edge, geometry.touching_first, geometry.touching
     skeleton_squared, any_near = view.skeleton * view.skeleton, False
     for pair in range(STACK_ROWS, end):
         node_v = pairs[pair, 1] if view.flipped else pairs[pair, 0]
         node_t = pairs[pair, 0] if view.flipped else pairs[pair, 1]
         low, high = row(geometry.node_min, node_t), row(geometry.node_max, node_t)
-        start_t, count_t = geometry.node_start[node_t], geometry.node_count[node_t]
-        start_v, count_v = geometry.node_start[node_v], geometry.node_count[node_v]
-        for owner in range(start_v, start_v + count_v):
-            for k in range(3):
-                corner = triangle[owner, k]
-                if not (owns[owner] >> k & 1 and geometry.vertex_corner[corner]):
-                    continue
-                p = moved(view.R, view.t, row(vertex, corner))
-                if outside_box(p, p, low, high, view.skeleton):
-                    continue
-                for slot in range(3 * start_t, 3 * (start_t + count_t)):
-                    face = slot // 3
-                    m = slot - 3 * face
-                    e = geometry.triangle_edge[face, m]
-                    if owns[face] >> (3 + m) & 1 and geometry.edge_kind[e] != EDGE_HIDDEN:
-                        a = row(vertex, edge[e, 0])
-                        side = subtract(row(vertex, edge[e, 1]), a)
-                        length_squared = dot(side, side)
-                        s = dot(subtract(p, a), side) / length_squared
-                        foot = along(a, s, side)
-                        off = subtract(foot, p)
-                        if -INSIDE <= s <= 1.0 + INSIDE and dot(off, off) <= skeleton_squared:
-                            size, any_near = sqrt(length_squared), True
-                            count = _corner_contact(geometry, view, found, count, corner, p, (foot, 2 * e + 1, size))
-                    v = triangle[face, m]
-                    # Two corners are compared once, from the side of the first body.
-                    if not view.flipped and owns[face] >> m & 1 and geometry.vertex_corner[v]:
-                        foot = row(vertex, v)
-                        off = subtract(foot, p)
-                        if dot(off, off) <= skeleton_squared:
-                            size, any_near = abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(foot[0]) + abs(foot[1]) + abs(foot[2]), True
-                            count = _corner_contact(geometry, view, found, count, corner, p, (foot, 2 * v, size))
+        start_t, start_v = geometry.node_start[node_t], geometry.node_start[node_v]
+        first_t, last_t = touching_first[start_t], touching_first[start_t + geometry.node_count[node_t]]
+        for i in range(touching_first[start_v], touching_first[start_v + geometry.node_count[node_v]]):
+            if touching[i] % 2 == 1:
+                continue
+            corner = touching[i] // 2
+            p = moved(view.R, view.t, row(vertex, corner))
+            if outside_box(p, p, low, high, view.skeleton):
+                continue
+            for j in range(first_t, last_t):
+                feature = touching[j]
+                if feature % 2 == 1:
+                    e = feature // 2
+                    a = row(vertex, edge[e, 0])
+                    side = subtract(row(vertex, edge[e, 1]), a)
+                    length_squared = dot(side, side)
+                    s = dot(subtract(p, a), side) / length_squared
+                    foot = along(a, s, side)
+                    off = subtract(foot, p)
+                    if -INSIDE <= s <= 1.0 + INSIDE and dot(off, off) <= skeleton_squared:
+                        size, any_near = sqrt(length_squared), True
+                        count = _corner_contact(geometry, view, found, count, corner, p, (foot, feature, size))
+                # Two corners are compared once, from the side of the first body.
+                elif not view.flipped:
+                    foot = row(vertex, feature // 2)
+                    off = subtract(foot, p)
+                    if dot(off, off) <= skeleton_squared:
+                        size, any_near = abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(foot[0]) + abs(foot[1]) + abs(foot[2]), True
+                        count = _corner_contact(geometry, view, found, count, corner, p, (foot, feature, size))
     return count, any_near
 
 
@@ -262,6 +260,20 @@ def _keep_closest(found, end):
 
 
 @jit_making_arrays
+def _meet(geometry, first, second, pose, pairs):
+    """Whether the skeletons of two primitives cross or are nearer than what is left of normals by round-off."""
+    nearest = MERGE * min(geometry.bound_radius[first], geometry.bound_radius[second])
+    pairs[0, 0] = geometry.node_first[first]
+    pairs[0, 1] = geometry.node_first[second]
+    _, end, _ = gather_leaf_pairs(geometry, pose.R, pose.t, nearest, nearest, True, pairs, np.int64(1))
+    # Most pairs end here: no leaves meet.
+    if end == STACK_ROWS:
+        return False
+    limit = nearest - geometry.radius[first] - geometry.radius[second]
+    return round_round_gap(geometry, first, second, pose, limit, pairs, np.empty(7)) < limit
+
+
+@jit_making_arrays
 def round_round_contacts(geometry, first, second, pose, margin, contacts, count):
     """Append the contacts of two ROUND primitives with gap <= margin, in the first one's frame; return the new count.
 
@@ -278,7 +290,7 @@ def round_round_contacts(geometry, first, second, pose, margin, contacts, count)
     slack = margin if edges_a > 0 and edges_b > 0 and radius_a + radius_b > 0.0 else 0.0
     open_a, open_b = not geometry.closed[first], not geometry.closed[second]
     found = Found(contacts.real, contacts.integer, count)
-    any_near = False
+    any_near, any_left_out = False, False
     for leeway in (0.0, ANY):
         of_a = View(False, R_back, t_back, R, t, radius_a, radius_b, margin, depth, skeleton, reach, slack, leeway, open_b)
         of_b = View(True, R, t, R_back, t_back, radius_b, radius_a, margin, depth, skeleton, reach, slack, leeway, open_a)
@@ -286,9 +298,8 @@ def round_round_contacts(geometry, first, second, pose, margin, contacts, count)
         pairs[0, 1] = geometry.node_first[second]
         stacked = np.int64(1)  # (a literal would compile the walk twice)
         while stacked > 0:
-            stacked, end = gather_leaf_pairs(
-                geometry.node_min, geometry.node_max, geometry.node_child, R, t, reach, pairs, stacked
-            )
+            stacked, end, left_out = gather_leaf_pairs(geometry, R, t, reach, depth + INSIDE * reach, leeway == ANY, pairs, stacked)
+            any_left_out = any_left_out or left_out
             count, near = edge_contacts(geometry, of_b, pairs, end, found, count)
             any_near = any_near or near
             for view in (of_a, of_b):
@@ -298,6 +309,6 @@ def round_round_contacts(geometry, first, second, pose, margin, contacts, count)
         if leeway == ANY:
             return _keep_closest(found, count)
         # Without any two features in reach there is no contact that round-off could have cost its normal.
-        if count > found.first or not any_near:
+        if count > found.first or not (any_near or (any_left_out and _meet(geometry, first, second, pose, pairs))):
             return count
     return count
