@@ -58,7 +58,7 @@ def close_stretches(run: Run) -> None:
     """Account for the trajectories under contact forces that are still under way."""
     state = run.state
     for i in np.flatnonzero(state.under_contact).tolist():
-        run.log.add_stretch(state.trajectory.start[i], np.inf, i, state.limiter.energy_at_start[i], 0.0)
+        run.log.add_stretch(state.trajectory.start[i], np.inf, i, state.limiter.energy_at_start[i], 0.0, bool(state.by_joints[i]))
 
 
 def release_times(world: World) -> np.ndarray:

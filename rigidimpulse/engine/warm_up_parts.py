@@ -140,7 +140,7 @@ def _record(run: Run, contacts: Contacts, members: np.ndarray) -> None:
     run.contact_log.replace(members, 0.0, contacts, run.state.now.position, np.ones((1, 3)))
     run.contact_log.close(members, 1.0)
     run.contact_log.table()
-    run.log.add_stretch(0.0, 1.0, 1, 0.0, 0.0)
+    run.log.add_stretch(0.0, 1.0, 1, 0.0, 0.0, False)
     # At the end a run looks which bodies belong together.
     roots(1, members[:0], members[:0])
 

@@ -66,6 +66,7 @@ class State:
         now: velocities and poses at the instant being worked on, valid for bodies with `stamp[i] == time` of that instant.
         limiter: of bodies under contact forces, what shows whether these make energy. under_contact, sharing, correction: its arrays.
         memory: rebounds of pairs, and the forces of held contacts (`contact_memory`).
+        by_joints: (n,) bool, bodies whose present trajectory is one of an island that joints alone hold together.
         sub_step: (n,) s, length of the last one of an island whose contacts turn, at its first body.
     """
 
@@ -83,6 +84,7 @@ class State:
         )
         self.rotation = np.zeros((n, 3, 3))
         self.memory = make_memory(n)
+        self.by_joints = np.zeros(n, bool)
         self.sub_step = np.full(n, np.inf)
         self.limiter = make_energy_limiter(n)
         self.under_contact, self.sharing, self.correction = self.limiter.under_contact, self.limiter.sharing, self.limiter.correction

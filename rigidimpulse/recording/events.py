@@ -31,9 +31,9 @@ ROW_LENGTH = IMPACT_DTYPE.itemsize // 8
 ENERGY_DTYPE = np.dtype([("time", np.float64), ("cause", np.int64), ("change", np.float64)])
 """One row a change of mechanical energy: s, number in `CAUSES`, J (negative is dissipated)."""
 STRETCH_DTYPE = np.dtype(
-    [("start", np.float64), ("end", np.float64), ("body", np.int64), ("energy", np.float64), ("work", np.float64)]
+    [("start", np.float64), ("end", np.float64), ("body", np.int64), ("energy", np.float64), ("work", np.float64), ("by_joints", np.bool_)]
 )
-"""One row a trajectory under contact forces: s, s, index, energy at the start [J], work of the forces [J]."""
+"""One row a trajectory under contact forces: s, s, index, energy at the start [J], work of the forces [J], whether joints alone hold it."""
 CAUSES = ("impact", "stick", "position correction", "energy correction", "joints", "sub-stepping", "overlap", "let go")
 """What changes mechanical energy at an instant, by the numbers that a log keeps."""
 IMPACT, STICK, POSITION_CORRECTION, ENERGY_CORRECTION = np.arange(4)
@@ -89,10 +89,10 @@ def log_energy(buffers, time, cause, change):
 
 
 @jit
-def log_stretch(buffers, start, end, body, energy, work):
+def log_stretch(buffers, start, end, body, energy, work, by_joints):
     """Append a trajectory under contact forces (see `STRETCH_DTYPE`); there must be space."""
     row = buffers.stretches[buffers.counts[1]]
-    row.start, row.end, row.body, row.energy, row.work = start, end, body, energy, work
+    row.start, row.end, row.body, row.energy, row.work, row.by_joints = start, end, body, energy, work, by_joints
     buffers.counts[1] += 1
 
 
@@ -183,10 +183,10 @@ class EventLog:
         self._reserve(energy=1)
         log_energy(self.buffers, time, CAUSES.index(cause), change)
 
-    def add_stretch(self, start: float, end: float, body: int, energy: float, work: float) -> None:
-        """Keep a trajectory under contact forces from start to end [s]: energy at the start and work of the forces [J]."""
+    def add_stretch(self, start: float, end: float, body: int, energy: float, work: float, by_joints: bool) -> None:
+        """Keep a trajectory under contact forces from start to end [s], see `STRETCH_DTYPE`: energy at the start and work [J]."""
         self._reserve(stretches=1)
-        log_stretch(self.buffers, start, end, body, energy, work)
+        log_stretch(self.buffers, start, end, body, energy, work, by_joints)
 
     def add_impacts(self, time: float, contacts: Contacts, position: np.ndarray, log: np.ndarray, count: int) -> None:
         """Keep the impacts that `write_impacts` describes."""

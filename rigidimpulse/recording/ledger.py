@@ -104,7 +104,10 @@ def make_ledger(frames: Frames, masses: Masses, log: EventLog, work: ForceWork |
         dissipated[cause] = dissipated.get(cause, 0.0) - change * done
     if len(log.stretches):
         given = 0.0 if work is None else work.on_bodies(position.shape[1])
-        dissipated["contact"] = _contact_work(times, kinetic + potential - given, log.stretches)
+        for cause, some in (("joints", log.stretches["by_joints"]), ("contact", ~log.stretches["by_joints"])):
+            if some.any():
+                taken = _work_of_stretches(times, kinetic + potential - given, log.stretches[some])
+                dissipated[cause] = dissipated.get(cause, 0.0) + taken
     stored = potential.sum(1)
     if work is not None:
         stored = stored + work.potential.sum(1)
@@ -137,8 +140,8 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.einsum("fnk,fnk->fn", a, b)
 
 
-def _contact_work(times: np.ndarray, energy: np.ndarray, stretches: np.ndarray) -> np.ndarray:
-    """Energy that contact forces took until each frame (f,); inside a stretch what the body, energy (f, n), lost since."""
+def _work_of_stretches(times: np.ndarray, energy: np.ndarray, stretches: np.ndarray) -> np.ndarray:
+    """Energy that forces took along trajectories until each frame (f,); inside a stretch what the body, energy (f, n), lost since."""
     first, last = np.searchsorted(times, stretches["start"], "right"), np.searchsorted(times, stretches["end"], "left")
     count = np.maximum(last - first, 0)
     frames = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())

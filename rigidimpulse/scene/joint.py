@@ -170,7 +170,15 @@ class _AnchoredJoint(Joint):
 
 @dataclass(frozen=True, eq=False)
 class BallJoint(_AnchoredJoint):
-    """Two bodies share the point `anchor`; `upper` bounds the angle between the axes (at the start both `axis`)."""
+    """Two bodies share the point `anchor`: a shoulder, a trailer hitch, a pendulum that swings to all sides.
+
+    Attributes:
+        anchor: (3,) m, in the world, as the scene starts.
+        axis: (3,), of any length: the direction from which each body's turn is measured, in the world, as the scene starts.
+        upper: rad, greatest angle between the axes of the two bodies. Without it they turn freely.
+        The others: see `Joint`.
+
+    """
 
     axis: ArrayLike = (0.0, 0.0, 1.0)
 
@@ -188,7 +196,15 @@ def across(axis: int) -> list[int]:
 
 @dataclass(frozen=True, eq=False)
 class HingeJoint(_AnchoredJoint):
-    """The bodies turn against each other about `axis` through `anchor`."""
+    """The bodies turn against each other about `axis` through `anchor`: a door, a wheel, an elbow.
+
+    Attributes:
+        anchor: (3,) m, a point on the axis. axis: (3,), of any length. Both in the world, as the scene starts.
+        lower, upper: rad, bounds of the turn of b against a, by the right hand about the axis; it is 0 as the scene starts.
+        motor: drives the turn, see `Motor`.
+        The others: see `Joint`.
+
+    """
 
     motor: Motor | None = None
 
@@ -200,7 +216,15 @@ class HingeJoint(_AnchoredJoint):
 
 @dataclass(frozen=True, eq=False)
 class SliderJoint(_AnchoredJoint):
-    """The bodies shift against each other along `axis`; they do not turn."""
+    """The bodies shift against each other along `axis` and do not turn: a drawer, a lift, a piston.
+
+    Attributes:
+        anchor: (3,) m, where the force acts. axis: (3,), of any length. Both in the world, as the scene starts.
+        lower, upper: m, bounds of the way of b along the axis; it is 0 as the scene starts.
+        motor: drives the shift, see `Motor`.
+        The others: see `Joint`.
+
+    """
 
     motor: Motor | None = None
 
@@ -212,7 +236,13 @@ class SliderJoint(_AnchoredJoint):
 
 @dataclass(frozen=True, eq=False)
 class FixedJoint(Joint):
-    """The bodies keep the pose they have to each other at the start."""
+    """The bodies keep the pose they have to each other as the scene starts: a weld, with `break_force` one that breaks.
+
+    Attributes:
+        anchor: (3,) m, where the force acts, in the world, as the scene starts; by default the centre of mass of b (of a, if b is None).
+        The others: see `Joint`; bounds mean nothing here.
+
+    """
 
     anchor: ArrayLike | None = None
 
@@ -231,7 +261,15 @@ class FixedJoint(Joint):
 
 @dataclass(frozen=True, eq=False)
 class DistanceJoint(Joint):
-    """Two points keep their distance `length` (that at the start by default); with bounds it is a rope or a strut."""
+    """Two points keep their distance: a rod; with bounds a rope or a strut.
+
+    Attributes:
+        anchor_a, anchor_b: (3,) m, a point of each body, in the world, as the scene starts.
+        length: m, > 0; by default that as the scene starts. With bounds alone the distance is free between them.
+        lower, upper: m, bounds of the distance: `upper` alone is a rope.
+        The others: see `Joint`.
+
+    """
 
     anchor_a: ArrayLike
     anchor_b: ArrayLike

@@ -17,7 +17,7 @@ def test_a_full_log_says_so_and_keeps_its_rows_when_it_grows() -> None:
     for k in range(FIRST_ROWS):
         assert has_capacity(log.buffers, 1, 0, 0)
         log_energy(log.buffers, float(k), IMPACT, -1.0 - k)
-    log_stretch(log.buffers, 0.0, 1.0, 3, 2.0, -1.0)
+    log_stretch(log.buffers, 0.0, 1.0, 3, 2.0, -1.0, True)
     assert has_capacity(log.buffers, 0, FIRST_ROWS - 1, FIRST_ROWS)
     assert not has_capacity(log.buffers, 1, FIRST_ROWS, 5 * FIRST_ROWS)
     log.grow()
@@ -26,7 +26,7 @@ def test_a_full_log_says_so_and_keeps_its_rows_when_it_grows() -> None:
     log.account(99.0, "let go", 0.0)  # nothing changed: no row
     assert log.energy["change"].tolist() == [*(-1.0 - np.arange(FIRST_ROWS)), 0.5]
     assert [CAUSES[k] for k in log.energy["cause"][-2:]] == ["impact", "let go"]
-    assert log.stretches.tolist() == [(0.0, 1.0, 3, 2.0, -1.0)]
+    assert log.stretches.tolist() == [(0.0, 1.0, 3, 2.0, -1.0, True)]
 
 
 def contacts_between(dice: np.random.Generator, bodies: np.ndarray, count: int):

@@ -795,7 +795,7 @@ def _begin_trajectory(loop, i, interval, wrench, rests):
     end_energy, begun = limiter.end_energy[i], limiter.energy_at_start[i]
     if end_energy == end_energy:
         limiter.end_energy[i] = np.nan
-        log_stretch(log, trajectory.start[i], time, i, begun, end_energy - begun)
+        log_stretch(log, trajectory.start[i], time, i, begun, end_energy - begun, False)
     pressed = take_steady_load(motion, constants, i, time, wrench, rests)
     limiter.under_contact[i] = pressed
     if pressed:

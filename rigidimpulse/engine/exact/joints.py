@@ -429,7 +429,7 @@ class JointState:
             account_contact_work(run, i, time)
         past = self.flights.fly_past(self._jointed(run, island), run.acceleration, rest)
         for i, begun in zip(members.tolist(), before, strict=True):
-            run.log.add_stretch(time, time + past, i, begun, mechanical_energy(now, constants, np.array([i])) - begun)
+            run.log.add_stretch(time, time + past, i, begun, mechanical_energy(now, constants, np.array([i])) - begun, True)
         for j in which.tolist():
             bodies = int(self.table.body_a[j]), int(self.table.body_b[j])
             run.impulses.add(f"joint {self.names[j]}", *bodies, time, time + past, self.flights.flight.mean[j])

@@ -44,6 +44,7 @@ def begin_trajectories(run: Run, pair_events: PairEvents, island: Island) -> Non
             or island.free is not None
         ):
             begin_trajectory(run, pair_events, i, island.time, (run.wrench[i], run.wrench_rate[i]), island.rests)
+            state.by_joints[i] = len(island.joints) > 0 and len(island.place) == 0
     set_margins(run, pair_events, island)
 
 
@@ -106,7 +107,8 @@ def account_contact_work(run: Run, i: int, time: float) -> None:
     begun, end_energy = limiter.energy_at_start[i], limiter.end_energy[i]
     if not isnan(end_energy):
         limiter.end_energy[i] = np.nan
-        run.log.add_stretch(run.state.trajectory.start[i], time, i, begun, end_energy - work_of_forces(run, i) - begun)
+        work = end_energy - work_of_forces(run, i) - begun
+        run.log.add_stretch(run.state.trajectory.start[i], time, i, begun, work, bool(run.state.by_joints[i]))
 
 
 def work_of_forces(run: Run, i: int) -> float:

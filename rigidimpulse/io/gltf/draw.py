@@ -60,7 +60,10 @@ class Drawing:
         self._paints: dict[str, int] = {}
 
     def mesh(self, body: Body, index: int, shape: Shape | None = None) -> int:
-        """Return the mesh of a body, or of a part of its shape, in the colours of the body, or that of the moving body `index`."""
+        """Return the mesh of a body, or of a part of its shape, in the colours of the body, or that of the moving body `index`.
+
+        Mesh and material have the name of the first body that they are made for.
+        """
         shape = body.drawn_shape if shape is None else shape
         geometry, drawn = self._geometry_of(shape)
         paint = surface(index % len(PALETTE), body, drawn)
@@ -69,8 +72,8 @@ class Drawing:
             attributes = dict(geometry["attributes"])
             if not paint["painted"]:
                 attributes.pop("COLOR_0", None)
-            primitive = {**geometry, "attributes": attributes, "material": self.paint(paint)}
-            self._meshes[key] = self.builder.add("meshes", {"primitives": [primitive]})
+            primitive = {**geometry, "attributes": attributes, "material": self.paint(paint, body.name)}
+            self._meshes[key] = self.builder.add("meshes", {"name": body.name, "primitives": [primitive]})
         return self._meshes[key]
 
     def _geometry_of(self, shape: Shape) -> tuple[dict[str, Any], DisplayMesh]:
@@ -92,13 +95,13 @@ class Drawing:
             self._geometry[key] = {"attributes": attributes, "indices": index}, drawn
         return self._geometry[key]
 
-    def paint(self, paint: dict[str, Any]) -> int:
-        """Return the material of a surface."""
+    def paint(self, paint: dict[str, Any], name: str) -> int:
+        """Return the material of a surface; name: of a material that is made for it."""
         key = str(paint)
         if key not in self._paints:
             # What is painted has its colours at the vertices, which multiply that of the material.
             linear = np.ones(3) if paint["painted"] else linear_of(seen_of_hex(paint["color"]))
             finish = {"baseColorFactor": [*linear.tolist(), 1.0]}
             finish |= {"metallicFactor": paint["metalness"], "roughnessFactor": paint["roughness"]}
-            self._paints[key] = self.builder.add("materials", {"pbrMetallicRoughness": finish, "doubleSided": True})
+            self._paints[key] = self.builder.add("materials", {"name": name, "pbrMetallicRoughness": finish, "doubleSided": True})
         return self._paints[key]

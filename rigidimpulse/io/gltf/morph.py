@@ -35,7 +35,7 @@ def add_soft_bodies(builder: Builder, tracks: list[FlexibleTrack], gravity: Any,
         primitive = {
             "attributes": _target(builder, shapes[0], normals[0]),
             "indices": builder.array(np.ravel(track.faces).astype(np.uint32), "SCALAR", target=INDICES),
-            "material": drawing.paint(soft_body_surface(colour + number, is_closed(track.faces))),
+            "material": drawing.paint(soft_body_surface(colour + number, is_closed(track.faces)), track.name),
         }
         mesh: dict[str, Any] = {"name": track.name, "primitives": [primitive]}
         if len(frames) > 1:
