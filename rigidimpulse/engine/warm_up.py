@@ -20,7 +20,8 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
-from typing import IO
+from pathlib import Path
+from typing import IO, Any
 
 from rigidimpulse.core.claim import claim
 from rigidimpulse.core.kernel_cache import is_kept, note_beside, variables_to_share_kernels
@@ -39,6 +40,8 @@ LAST = {
     STEPPED_JOINTS: ("dynamics.solvers.time_stepping.solver", "step_island"),
 }
 """The kernel of each kind that is compiled last."""
+OF_CYLINDERS = (CONTACTS, SUBSTEPPED)
+"""Kinds of which scenes with cylinders need other ones."""
 _BACKGROUND: list[subprocess.Popen] = []
 """Processes that nobody waits for."""
 PARTS_MODULE = "rigidimpulse.engine.warm_up_parts"
@@ -85,18 +88,33 @@ def _alone(seconds: float) -> Iterator[None]:
 def kernels_to_compile(world: World, with_events: bool, with_substepped: bool, is_ready: Callable[[Kernel], bool] = is_cached) -> list[str]:
     """Kinds of kernels that a run of a world needs and that do not lie in the cache: what is compiled last of each tells.
 
-    is_ready: whether a kernel need not be compiled.
+    is_ready: whether a kernel need not be compiled. Of kinds that lie there without those of cylinders, a note beside them tells.
     """
     joints = bool(world.joints_of_scene)
     needed = {
         CONTACTS: world.can_collide, EVENTS: with_events, SUBSTEPPED: with_substepped, JOINTS: joints,
         STEPPED_JOINTS: with_substepped and joints,
     }  # fmt: skip
-    missing = []
-    for kind, (module, name) in LAST.items():
-        if needed[kind] and not is_ready(getattr(import_module(f"rigidimpulse.{module}"), name)):
-            missing.append(kind)
-    return missing
+    cylinders = OF_CYLINDERS if world.cylinders is not None else ()
+    return [
+        kind
+        for kind in LAST
+        if needed[kind] and not (is_ready(_last_kernel(kind)) and (kind not in cylinders or _knows_cylinders(kind)))
+    ]
+
+
+def _last_kernel(kind: str) -> Any:
+    module, name = LAST[kind]
+    return getattr(import_module(f"rigidimpulse.{module}"), name)
+
+
+def note_of_cylinders(kind: str, part: int) -> Path:
+    """The file that says that a part of a kind was compiled for scenes with cylinders: the kernels do not tell for what they were."""
+    return note_beside(_last_kernel(kind).py_func, f"cylinders.{part}")
+
+
+def _knows_cylinders(kind: str) -> bool:
+    return all(note_of_cylinders(kind, part).exists() for part in range(NUMBER_OF_PARTS[kind]))
 
 
 def compile_kernels(world: World, kinds: list[str]) -> None:

@@ -9,6 +9,7 @@ import os
 import sys
 import time
 from collections.abc import Collection, Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -51,10 +52,12 @@ from rigidimpulse.engine.warm_up import (
     JOINTS,
     LOOK_AGAIN,
     LOOP,
+    OF_CYLINDERS,
     ROLLING,
     STEPPED_JOINTS,
     SUBSTEPPED,
     claim_loop,
+    note_of_cylinders,
 )
 from rigidimpulse.model.contact_memory import grown, make_memory
 from rigidimpulse.model.contacts import Contacts, Touching
@@ -290,6 +293,9 @@ PARTS = {
 def compile_part(kind: str, part: int, features: Collection[str]) -> None:
     """Compile one part, for scenes with these features: CYLINDERS, ROLLING."""
     PARTS[kind][part](_box_on_floor(CYLINDERS in features, kind in (JOINTS, STEPPED_JOINTS), ROLLING in features))
+    if CYLINDERS in features and kind in OF_CYLINDERS:
+        with suppress(OSError):  # Where no file can be made, no kernel is kept either.
+            note_of_cylinders(kind, part).touch()
 
 
 def compile_alone(kind: str, part: int, features: Sequence[str]) -> None:

@@ -89,6 +89,19 @@ def test_only_what_a_scene_needs_and_the_cache_lacks_is_compiled():
     assert warm_up.kernels_to_compile(arm, True, True, always) == []
 
 
+def test_kernels_of_cylinders_are_not_taken_for_compiled_because_others_are():
+    """The first scene with a cylinder compiled for 19 s without a word where a scene of boxes had run before."""
+    cans = [ri.Body(f"can {k}", ri.Shape.cylinder(0.1, 0.2), position=(0, 0, k)) for k in range(2)]
+    world = compile_scene(ri.Scene(bodies=cans))
+    parts = range(warm_up.NUMBER_OF_PARTS[warm_up.CONTACTS])
+    if not all(warm_up.note_of_cylinders(warm_up.CONTACTS, part).exists() for part in parts):
+        assert warm_up.kernels_to_compile(world, False, False, always) == ["contacts"]
+    for part in parts:
+        with warm_up.start_process(warm_up.CONTACTS, str(part), warm_up.CYLINDERS) as process:
+            assert process.wait() == 0
+    assert warm_up.kernels_to_compile(world, False, False, always) == []
+
+
 def never(_kernel: Kernel) -> bool:
     """A machine that has run nothing yet."""
     return False
