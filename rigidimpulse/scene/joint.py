@@ -216,7 +216,7 @@ class HingeJoint(_AnchoredJoint):
 
 @dataclass(frozen=True, eq=False)
 class SliderJoint(_AnchoredJoint):
-    """The bodies shift against each other along `axis` and do not turn: a drawer, a lift, a piston.
+    """The bodies shift against each other along `axis` and do not turn: a drawer, a piston, a sliding door.
 
     Attributes:
         anchor: (3,) m, where the force acts. axis: (3,), of any length. Both in the world, as the scene starts.
