@@ -102,13 +102,11 @@ def gather_leaf_pairs(geometry, R, t, reach, depth, any_normal, pairs, stacked):
         b = pairs[stacked, 1]
         low_a, high_a = row(node_min, a), row(node_max, a)
         low_b, high_b = row(node_min, b), row(node_max, b)
-        by_normals = not any_normal and not (_normals_oppose(cone, a, b, R) and _in_reach(geometry, a, b, R, t, reach, depth))
-        if any_normal or (by_normals and not left_out):
-            far = box_distance_squared(low_a, high_a, low_b, high_b, R, t, reach * reach) > reach * reach
-            left_out = left_out or (by_normals and not far)
-            if far:
+        if any_normal:
+            if box_distance_squared(low_a, high_a, low_b, high_b, R, t, reach * reach) > reach * reach:
                 continue
-        if by_normals:
+        elif not (_normals_oppose(cone, a, b, R) and _in_reach(geometry, a, b, R, t, reach, depth)):
+            left_out = left_out or box_distance_squared(low_a, high_a, low_b, high_b, R, t, reach * reach) <= reach * reach
             continue
         child_a = node_child[a]
         child_b = node_child[b]

@@ -1,8 +1,8 @@
 """Cones of the normals with which a surface of triangles can touch, for every node of its box tree.
 
 Two features touch with a normal n from a to b that lies in the Gauss arc or cone of a's feature, and -n in that of b's (see
-`manifold.mesh_mesh`). So two nodes of the box trees whose cones cannot hold n and -n have no contact, however near they are: a walk through
-both trees leaves them out. On two rings that hang in each other this leaves out three of four pairs of leaves.
+`manifold.mesh_mesh`). So two nodes of the box trees whose cones cannot hold n and -n have no contact, however near they are.
+Neither have nodes that no way along such an n leads from one to the other. A walk through both trees leaves them out (`bvh`).
 Source: Johnson and Cohen, "Spatialized normal cone hierarchies", Symposium on Interactive 3D Graphics, 2001.
 
 A cone has an axis c and a half angle a, and holds every unit n with an angle to c of a at most.

@@ -245,7 +245,7 @@ def _carry_state(earlier: Run, run: Run, rows: _Both) -> None:
         (before.trajectory, now.trajectory, before.trajectory._fields),
         (before.now, now.now, (*STARTS, "inv_inertia")),
         (before.limiter, now.limiter, before.limiter._fields[:-1]),  # the last is a constant
-        (before, now, ("rotation", "sub_step")),
+        (before, now, ("rotation", "sub_step", "by_joints")),
         (earlier, run, ("acceleration", "angular_acceleration", "wrench", "wrench_rate")),
         (earlier.world, run.world, ("dynamic", "moving", "inv_mass")),  # of bodies that are let go
     ):

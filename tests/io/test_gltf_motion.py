@@ -203,6 +203,9 @@ def test_a_scene_from_code_stands_y_up(tmp_path: Path) -> None:
             assert np.abs(now[:3, :3] - up @ turned(run.orientation(name)[frame])).max() < SINGLE
     meshes = [tree["meshes"][player.nodes[player.index(name)]["mesh"]]["primitives"][0] for name in ("a", "b", "floor")]
     assert meshes[0]["attributes"] == meshes[1]["attributes"] and meshes[0]["material"] != meshes[1]["material"]
+    # Without names, programs call them all "GLTF".
+    for kind in ("meshes", "materials"):
+        assert sorted(one["name"] for one in tree[kind]) == ["a", "b", "floor"]
     corners = tree["accessors"][meshes[2]["attributes"]["POSITION"]]
     assert corners["min"][2] == corners["max"][2] == 0.0 and corners["max"][0] >= 10.0
 
