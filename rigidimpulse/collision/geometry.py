@@ -115,8 +115,6 @@ class Shapes(NamedTuple):
 
     geometry: Geometry
     of_body: np.ndarray  # (n,) shape of each body
-    cylinders: np.ndarray | None
-    """(c,) primitives that are cylinders; None where there is none: then numba compiles no kernel of cylinders"""
 
 
 class _Surface(NamedTuple):
@@ -189,12 +187,6 @@ def build_geometry(shapes: Sequence[CompiledShape]) -> Geometry:
         node_count=_join([s.node_count for s in surfaces], (0,), np.int64),
         node_cone=_join([s.node_cone for s in surfaces], (0, 11), np.float64),
     )
-
-
-def cylinders_of(geometry: Geometry) -> np.ndarray | None:
-    """Primitives (c,) that are cylinders, None where there is none; see `Shapes`."""
-    cylinders = np.flatnonzero(geometry.kind == CYLINDER)
-    return cylinders if len(cylinders) else None
 
 
 def compile_shape(shape: Shape, center_of_mass: ArrayLike, principal_rotation: ArrayLike) -> CompiledShape:

@@ -98,7 +98,7 @@ def bind_compiled_loop(run: Run) -> None:
     if compiled.is_compiled():
         run.compiled = compiled
     elif compiled.begin_compiling():
-        compile_loop_in_background(run.world)
+        compile_loop_in_background()
 
 
 def _bind_forces(run: Run, times: np.ndarray) -> None:

@@ -25,6 +25,8 @@ from rigidimpulse.scene.scene import Scene, validate
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.forces.force import Force, ForceTable
 
+_NO_ROLLING = np.zeros((0, 0, 2))
+"""Rolling friction where no material asks for any."""
 
 def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out: frozenset[str] = frozenset()) -> World:
     """Check a scene and compile it, without the effects whose names are in `left_out`.
@@ -72,7 +74,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
         static_max=high,
         material_of_body=material_of_body,
         coefficients=coefficients,
-        rolling=None if "rolling friction" in left_out else rolling,
+        rolling=_NO_ROLLING if "rolling friction" in left_out else rolling,
         flat=_has_faces(geometry, shape_of_body),
         half_space=np.array([_all_half_spaces(geometry, k) for k in shape_of_body], bool),
         ball=np.array([_is_ball(geometry, k) for k in shape_of_body], bool),
@@ -266,11 +268,11 @@ def _has_faces(geometry: Geometry, shape_of_body: np.ndarray) -> np.ndarray:
     return np.array(flat, bool)[shape_of_body]
 
 
-def _materials(bodies: list[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+def _materials(bodies: list[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Index of each body's material, the combined coefficients of all pairs of materials, and their rolling friction."""
     unique = list(dict.fromkeys(body.material for body in bodies))
     index = np.array([unique.index(body.material) for body in bodies], np.int64)
     coefficients = np.array([[combine(a, b) for b in unique] for a in unique], float)
     rolling = np.array([[combine_rolling(a, b) for b in unique] for a in unique], float)
     k = len(unique)
-    return index, coefficients.reshape(k, k, 4), rolling.reshape(k, k, 2) if rolling.any() else None
+    return index, coefficients.reshape(k, k, 4), rolling.reshape(k, k, 2) if rolling.any() else _NO_ROLLING

@@ -213,7 +213,7 @@ class RollingFriction:
 
     def bind(self, world: World) -> Bound | Skip:
         """Included where a pair of materials has a length."""
-        if world.rolling is None or not world.can_collide:
+        if not (world.rolling.size and world.can_collide):
             return Skip("no material asks for it")
         return Bound(f"lengths up to {float(np.max(world.rolling)):g} m")
 

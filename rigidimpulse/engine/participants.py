@@ -83,7 +83,7 @@ class RunJoints(Protocol):
         ...
 
     def hold(
-        self, run: Any, island: Island, contacts: Contacts, turning: np.ndarray, force: np.ndarray, rest: float, rolling: Rolling | None, /
+        self, run: Any, island: Island, contacts: Contacts, turning: np.ndarray, force: np.ndarray, rest: float, rolling: Rolling, /
     ) -> tuple[float, float]:
         """Forces into run.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
         ...

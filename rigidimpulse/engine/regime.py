@@ -61,11 +61,11 @@ def why_not_substepped(world: World) -> str:
         return "nothing presses bodies together"
     if world.force_tables:
         return "forces vary"
-    if solver == "cheapest" and world.rolling is not None:
+    if solver == "cheapest" and world.rolling.size:
         return "rolling friction is exact only"
     if solver == "substepped":
         # Everything that touches would be stepped, and roll for ever.
-        return "rolling friction is exact only" if world.rolling is not None else ""
+        return "rolling friction is exact only" if world.rolling.size else ""
     if world.joints_of_scene or only_expensive(world):
         return ""
     # A crowd is looked at in every step, for nothing if all of it rebounds.
@@ -213,7 +213,7 @@ def refusals(
         out[r] = "few bodies"
     cheap = solves_in_islands(root, solve_count) <= np.where(touches, EXPENSIVE_JOINTED, EXPENSIVE_SWING)
     # Sub-steps have no rolling friction.
-    stays_exact = np.full(len(root), True) if world.rolling is not None else cheap | (size < KEPT)
+    stays_exact = np.full(len(root), True) if world.rolling.size else cheap | (size < KEPT)
     for r in np.flatnonzero(has_joints & ~was_substepped & stays_exact).tolist():
         out[r] = "joints"
     # The rest holds only where an island begins: a body that comes near later is taken in.

@@ -17,10 +17,9 @@ import logging
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
-from pathlib import Path
 from typing import IO, Any
 
 from rigidimpulse.core.claim import claim
@@ -29,8 +28,8 @@ from rigidimpulse.core.kernels import Kernel, is_cached
 from rigidimpulse.model.world import World
 
 logger = logging.getLogger("rigidimpulse")
-LOOP, ROLLING = "order of events", "rolling"
-CYLINDERS, CONTACTS, EVENTS, SUBSTEPPED, JOINTS = "cylinders", "contacts", "impacts of balls", "sub-stepped islands", "joints"
+LOOP = "order of events"
+CONTACTS, EVENTS, SUBSTEPPED, JOINTS = "contacts", "impacts of balls", "sub-stepped islands", "joints"
 STEPPED_JOINTS = "joints in sub-stepped islands"
 LAST = {
     CONTACTS: ("engine.touching", "find_touching"),
@@ -40,8 +39,6 @@ LAST = {
     STEPPED_JOINTS: ("dynamics.solvers.time_stepping.solver", "step_island"),
 }
 """The kernel of each kind that is compiled last."""
-OF_CYLINDERS = (CONTACTS, SUBSTEPPED)
-"""Kinds of which scenes with cylinders need other ones."""
 _BACKGROUND: list[subprocess.Popen] = []
 """Processes that nobody waits for."""
 PARTS_MODULE = "rigidimpulse.engine.warm_up_parts"
@@ -63,7 +60,7 @@ def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> N
             kinds, seconds = ", ".join(missing), sum(SECONDS[kind] for kind in missing)
             once = "for the first run on this machine, once" if is_kept() else "for this process alone, as no folder keeps them"
             logger.warning(f"compiling kernels ({kinds}) {once}: this takes about {seconds} s")
-            compile_kernels(world, missing)
+            compile_kernels(missing)
 
 
 @contextmanager
@@ -88,19 +85,14 @@ def _alone(seconds: float) -> Iterator[None]:
 def kernels_to_compile(world: World, with_events: bool, with_substepped: bool, is_ready: Callable[[Kernel], bool] = is_cached) -> list[str]:
     """Kinds of kernels that a run of a world needs and that do not lie in the cache: what is compiled last of each tells.
 
-    is_ready: whether a kernel need not be compiled. Of kinds that lie there without those of cylinders, a note beside them tells.
+    is_ready: whether a kernel need not be compiled.
     """
     joints = bool(world.joints_of_scene)
     needed = {
         CONTACTS: world.can_collide, EVENTS: with_events, SUBSTEPPED: with_substepped, JOINTS: joints,
         STEPPED_JOINTS: with_substepped and joints,
     }  # fmt: skip
-    cylinders = OF_CYLINDERS if world.cylinders is not None else ()
-    return [
-        kind
-        for kind in LAST
-        if needed[kind] and not (is_ready(_last_kernel(kind)) and (kind not in cylinders or _knows_cylinders(kind)))
-    ]
+    return [kind for kind in LAST if needed[kind] and not is_ready(_last_kernel(kind))]
 
 
 def _last_kernel(kind: str) -> Any:
@@ -108,38 +100,27 @@ def _last_kernel(kind: str) -> Any:
     return getattr(import_module(f"rigidimpulse.{module}"), name)
 
 
-def note_of_cylinders(kind: str, part: int) -> Path:
-    """The file that says that a part of a kind was compiled for scenes with cylinders: the kernels do not tell for what they were."""
-    return note_beside(_last_kernel(kind).py_func, f"cylinders.{part}")
-
-
-def _knows_cylinders(kind: str) -> bool:
-    return all(note_of_cylinders(kind, part).exists() for part in range(NUMBER_OF_PARTS[kind]))
-
-
-def compile_kernels(world: World, kinds: list[str]) -> None:
-    """Compile kernels of these kinds for a world. Should another process fail, its part is compiled when used."""
-    cylinders = [CYLINDERS] if world.cylinders is not None else []
+def compile_kernels(kinds: list[str]) -> None:
+    """Compile kernels of these kinds. Should another process fail, its part is compiled when used."""
     mine, *others = [(kind, part) for kind in kinds for part in range(NUMBER_OF_PARTS[kind])]
     with ExitStack() as processes:
         for kind, part in others:
-            processes.enter_context(start_process(kind, str(part), *cylinders))
+            processes.enter_context(start_process(kind, str(part)))
         with _without_garbage_collection():
-            import_module(PARTS_MODULE).compile_part(*mine, cylinders)
+            import_module(PARTS_MODULE).compile_part(*mine)
 
 
-def compile_loop_in_background(world: World) -> None:
-    """Start a process that compiles the order of events for worlds like this one, unless one does; it goes on by itself."""
-    features = [*([CYLINDERS] if world.cylinders is not None else []), *([] if world.rolling is None else [ROLLING])]
-    if (held := claim_loop(features)) is not None:
+def compile_loop_in_background() -> None:
+    """Start a process that compiles the order of events, unless one does; it goes on by itself."""
+    if (held := claim_loop()) is not None:
         # The process takes the claim itself: this one may end before.
         held.close()
-        _BACKGROUND.append(start_process(LOOP, "0", *features))
+        _BACKGROUND.append(start_process(LOOP, "0"))
 
 
-def claim_loop(features: Sequence[str]) -> IO[bytes] | None:
-    """Claim the order of events for worlds with these features, to compile it; None where another process compiles it."""
-    return claim(note_beside(prepare_kernels, f"{'-'.join(['loop', *features])}.lock"))
+def claim_loop() -> IO[bytes] | None:
+    """Claim the order of events, to compile it; None where another process compiles it."""
+    return claim(note_beside(prepare_kernels, "loop.lock"))
 
 
 def start_process(*arguments: str, errors: IO[bytes] | None = None) -> subprocess.Popen:

@@ -1,4 +1,4 @@
-"""All kernels that a first run may call, compiled before it: every kind, for scenes with and without cylinders and rolling friction.
+"""All kernels that a first run may call, compiled before it: every kind.
 
 Each part (see `warm_up_parts.py`) is compiled in a process of its own, several at a time on all cores. A note beside the kernels
 says that a part is done; its name has the digest of all sources that a part is compiled from. A part without a note whose kernels lie in
@@ -22,12 +22,10 @@ from rigidimpulse.core.kernel_cache import note_beside, source_digest
 from rigidimpulse.core.kernels import INTERPRETED
 from rigidimpulse.engine.warm_up import (
     CONTACTS,
-    CYLINDERS,
     EVENTS,
     JOINTS,
     LOOP,
     NUMBER_OF_PARTS,
-    ROLLING,
     SECONDS,
     STEPPED_JOINTS,
     SUBSTEPPED,
@@ -43,11 +41,10 @@ LOOP_SECONDS = 90
 
 @dataclass(frozen=True)
 class KernelPart:
-    """What one process compiles: a kind, the number of its part, and the features of scenes that it is for."""
+    """What one process compiles: a kind, and the number of its part."""
 
     kind: str
     number: int = 0
-    features: tuple[str, ...] = ()
 
     @property
     def seconds(self) -> float:
@@ -55,12 +52,12 @@ class KernelPart:
         return LOOP_SECONDS if self.kind == LOOP else SECONDS[self.kind] / NUMBER_OF_PARTS[self.kind]
 
     def __str__(self) -> str:
-        """Return its kind and features in words."""
-        return " with ".join([self.kind, *([" and ".join(self.features)] if self.features else [])])
+        """Return its kind."""
+        return self.kind
 
     def note(self) -> Path:
         """The file that says that it is compiled."""
-        words = [source_digest(PARTS), self.kind, str(self.number), *self.features]
+        words = [source_digest(PARTS), self.kind, str(self.number)]
         return note_beside(start_process, "-".join(words).replace(" ", "_"))
 
 
@@ -72,16 +69,12 @@ class Failed:
     reason: str
 
 
+ORDER = (CONTACTS, SUBSTEPPED, JOINTS, STEPPED_JOINTS, EVENTS)
 ALL_PARTS = (
-    *(KernelPart(CONTACTS, number, features) for features in ((), (CYLINDERS,)) for number in range(NUMBER_OF_PARTS[CONTACTS])),
-    KernelPart(CONTACTS, 0, (ROLLING,)),
-    *(KernelPart(SUBSTEPPED, number, features) for features in ((), (CYLINDERS,)) for number in range(NUMBER_OF_PARTS[SUBSTEPPED])),
-    *(KernelPart(JOINTS, number) for number in range(NUMBER_OF_PARTS[JOINTS])),
-    KernelPart(STEPPED_JOINTS),
-    KernelPart(EVENTS),
-    *(KernelPart(LOOP, 0, features) for features in ((), (CYLINDERS,), (ROLLING,))),
+    *(KernelPart(kind, number) for kind in ORDER for number in range(NUMBER_OF_PARTS[kind])),
+    KernelPart(LOOP),
 )
-"""All there are. The loops come last: runs go without them."""
+"""All there are. The order of events comes last: runs go without it."""
 
 
 def missing_parts() -> list[KernelPart]:
@@ -131,7 +124,7 @@ class _Compiling:
         self.part = part
         self._begin = perf_counter()
         self._said: IO[bytes] = tempfile.TemporaryFile()
-        self.process: subprocess.Popen = start_process(part.kind, str(part.number), *part.features, errors=self._said)
+        self.process: subprocess.Popen = start_process(part.kind, str(part.number), errors=self._said)
 
     def __enter__(self) -> _Compiling:
         return self

@@ -1,6 +1,6 @@
 """Kernels of each kind that are compiled ahead, in parts of about equal time that share little; see `warm_up.py`.
 
-As a program it compiles one part, in a process of its own: `python -m rigidimpulse.engine.warm_up_parts KIND PART [cylinders] [rolling]`.
+As a program it compiles one part, in a process of its own: `python -m rigidimpulse.engine.warm_up_parts KIND PART`.
 """
 
 from __future__ import annotations
@@ -8,8 +8,6 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Collection, Sequence
-from contextlib import suppress
 
 import numpy as np
 
@@ -47,17 +45,13 @@ from rigidimpulse.engine.substepped.jointed import JointedStepper
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.warm_up import (
     CONTACTS,
-    CYLINDERS,
     EVENTS,
     JOINTS,
     LOOK_AGAIN,
     LOOP,
-    OF_CYLINDERS,
-    ROLLING,
     STEPPED_JOINTS,
     SUBSTEPPED,
     claim_loop,
-    note_of_cylinders,
 )
 from rigidimpulse.model.contact_memory import grown, make_memory
 from rigidimpulse.model.contacts import Contacts, Touching
@@ -68,7 +62,6 @@ from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.joint import HingeJoint
-from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 
@@ -81,12 +74,10 @@ def _run_of(scene: Scene) -> Run:
     return make_run(world, make_plan(world), Recorder(np.array([0.0, 1.0]), 2), EventLog())
 
 
-def _box_on_floor(with_cylinder: bool, jointed: bool, rolls: bool) -> Run:
-    """A run of a scene that has a contact from the start, and a joint and rolling friction if it is to."""
+def _box_on_floor(jointed: bool) -> Run:
+    """A run of a scene that has a contact from the start, and a joint if it is to."""
     scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static")])
-    shape = Shape.cylinder(1, 1) if with_cylinder else Shape.box((1, 1, 1))
-    material = Material(rolling_friction=0.01) if rolls else Material()
-    scene.add(Body("body", shape, position=(0, 0, 0.5), velocity=(0, 0, -1), material=material))
+    scene.add(Body("body", Shape.box((1, 1, 1)), position=(0, 0, 0.5), velocity=(0, 0, -1)))
     if jointed:
         scene.add(HingeJoint("body", None, (0, 0, 1), (1, 0, 0)))
     return _run_of(scene)
@@ -290,23 +281,20 @@ PARTS = {
 """What is compiled at once, by kind; each gets a run."""
 
 
-def compile_part(kind: str, part: int, features: Collection[str]) -> None:
-    """Compile one part, for scenes with these features: CYLINDERS, ROLLING."""
-    PARTS[kind][part](_box_on_floor(CYLINDERS in features, kind in (JOINTS, STEPPED_JOINTS), ROLLING in features))
-    if CYLINDERS in features and kind in OF_CYLINDERS:
-        with suppress(OSError):  # Where no file can be made, no kernel is kept either.
-            note_of_cylinders(kind, part).touch()
+def compile_part(kind: str, part: int) -> None:
+    """Compile one part."""
+    PARTS[kind][part](_box_on_floor(kind in (JOINTS, STEPPED_JOINTS)))
 
 
-def compile_alone(kind: str, part: int, features: Sequence[str]) -> None:
+def compile_alone(kind: str, part: int) -> None:
     """The same in a process of its own. Where another one compiles the order of events, this one waits, and finds it in the cache."""
     held = None
-    while kind == LOOP and (held := claim_loop(features)) is None:
+    while kind == LOOP and (held := claim_loop()) is None:
         time.sleep(LOOK_AGAIN)
-    compile_part(kind, part, features)
+    compile_part(kind, part)
     if held is not None:
         held.close()
 
 
 if __name__ == "__main__":
-    compile_alone(sys.argv[1], int(sys.argv[2]), sys.argv[3:])
+    compile_alone(sys.argv[1], int(sys.argv[2]))

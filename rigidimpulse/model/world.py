@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.geometry import CompiledShape, Geometry, Shapes, cylinders_of
+from rigidimpulse.collision.geometry import CompiledShape, Geometry, Shapes
 from rigidimpulse.collision.manifold.shrunk_shapes import convex_depths
 from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.scene.frames import own_pose
@@ -58,7 +58,7 @@ class World:
         shape_of_body: (n,). size: (n,) m, largest extent, inf for half spaces. bound_radius: (n,) m about the centre of mass.
         static_min, static_max: (n, 3) m, world boxes of bodies where they start.
         material_of_body: (n,). coefficients: (k, k, 4), see material.combine.
-        rolling: (k, k, 2) m, rolling and spinning friction, see material.combine_rolling; None where there is none.
+        rolling: (k, k, 2) m, rolling and spinning friction, see material.combine_rolling; (0, 0, 2) where there is none.
         flat: (n,) bool, has faces or rims that must not touch those of another at gap 0.
         half_space, ball: (n,) bool, the shape is half spaces only; one sphere about the centre of mass.
         impact_margin: gap at which faces and rims meet, as a fraction of the smaller body's size.
@@ -95,7 +95,7 @@ class World:
     static_max: np.ndarray
     material_of_body: np.ndarray
     coefficients: np.ndarray
-    rolling: np.ndarray | None
+    rolling: np.ndarray
     flat: np.ndarray
     half_space: np.ndarray
     ball: np.ndarray
@@ -120,12 +120,7 @@ class World:
     @cached_property
     def compiled_shapes(self) -> Shapes:
         """The shapes of the bodies, for kernels."""
-        return Shapes(self.geometry, self.shape_of_body, self.cylinders)
-
-    @cached_property
-    def cylinders(self) -> np.ndarray | None:
-        """Primitives (c,) that are cylinders, None where there is none; see `geometry.Shapes`."""
-        return cylinders_of(self.geometry)
+        return Shapes(self.geometry, self.shape_of_body)
 
     @cached_property
     def steady_strength(self) -> np.ndarray:

@@ -83,7 +83,7 @@ from rigidimpulse.engine.compile_scene import compile_scene
 balls = [ri.Body("a", ri.Shape.sphere(1.0)), ri.Body("b", ri.Shape.sphere(2.0), position=(0, 3, 4))]
 world, buffer = compile_scene(ri.Scene(bodies=balls)), ContactBuffer()
 pairs = PairQuery(np.array([0]), np.array([1]), np.array([9.0]))
-shapes = Shapes(world.geometry, world.shape_of_body, world.cylinders)
+shapes = Shapes(world.geometry, world.shape_of_body)
 count = buffer.find(Question(shapes, world, np.tile(np.eye(3), (2, 1, 1)), pairs))
 print(count, *buffer.real[0, 6:10])
 """

@@ -110,7 +110,7 @@ def contact_at(run: Run, time: float):
     bring_all(state.trajectory, np.arange(2), time, state.now, state.rotation, run.acceleration, run.angular_acceleration)
     buffer = run.contact_buffer
     query = PairQuery(np.array([0]), np.array([1]), np.array([MARGIN]))
-    shapes = Shapes(world.geometry, world.shape_of_body, world.cylinders)
+    shapes = Shapes(world.geometry, world.shape_of_body)
     count = buffer.find(Question(shapes, state.now, state.rotation, query))
     nearest = np.array([np.argmin(buffer.real[:count, 9])])
     one = Contacts(*(np.empty(1, np.int64) for _ in range(2)), *(np.empty((1, 3)) for _ in range(3)), *(np.empty(1) for _ in range(5)))

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, CompiledShape, Primitive, Shapes, build_geometry, cylinders_of
+from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, CompiledShape, Primitive, Shapes, build_geometry
 from rigidimpulse.collision.manifold.contact_points import Contacts as Buffers
 from rigidimpulse.collision.manifold.dispatch import SCRATCH_ROWS, Posed, pair_contacts, pair_gap
 from rigidimpulse.collision.manifold.reduce import reduce_contacts
@@ -89,7 +89,7 @@ class Scene:
         self.scratch = np.empty((scratch_rows, 2), dtype=np.int64)
         self.real = np.full((capacity, 10), np.nan)
         self.integer = np.full((capacity, 5), -7, dtype=np.int64)
-        self.shapes = Shapes(self.geometry, np.arange(len(shapes)), cylinders_of(self.geometry))
+        self.shapes = Shapes(self.geometry, np.arange(len(shapes)))
         self.buffers = Buffers(self.real, self.integer, self.scratch)
 
     def contacts(self, pose_a, pose_b, margin, shapes=(0, 1), reduced=False):

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 import rigidimpulse as ri
-from rigidimpulse.core.kernels import Kernel
+from rigidimpulse.core.kernels import KERNELS, Kernel
 from rigidimpulse.engine import warm_up
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.gallery import load
@@ -21,7 +21,7 @@ from rigidimpulse.core.kernels import KERNELS
 from rigidimpulse.gallery import load
 
 for half in (warm_up_parts.{first}, warm_up_parts.{second}):
-    half(warm_up_parts._box_on_floor(False, {jointed}, False))
+    half(warm_up_parts._box_on_floor({jointed}))
 ahead = {{kernel.name: set(kernel.entry.overloads) for kernel in KERNELS if kernel.entry.overloads}}
 entry = load("{scene}")
 run = prepare(entry.scene(), np.arange(19) / 60.0, entry.accuracy)
@@ -63,7 +63,7 @@ def used():
     return {kernel.name for kernel in KERNELS if kernel.calls or kernel.preparing}
 
 for half in (warm_up_parts._respond_and_detect, warm_up_parts._move_and_sweep):
-    half(warm_up_parts._box_on_floor(False, False, False))
+    half(warm_up_parts._box_on_floor(False))
 ahead = used()
 floor = ri.Body("floor", ri.Shape.half_space(), motion="static")
 prepared = prepare(ri.Scene(bodies=[floor, ri.Body("box", ri.Shape.box(0.2), position=(0, 0, 1))]), np.arange(61) / 60.0)
@@ -89,17 +89,21 @@ def test_only_what_a_scene_needs_and_the_cache_lacks_is_compiled():
     assert warm_up.kernels_to_compile(arm, True, True, always) == []
 
 
-def test_kernels_of_cylinders_are_not_taken_for_compiled_because_others_are():
-    """The first scene with a cylinder compiled for 19 s without a word where a scene of boxes had run before."""
-    cans = [ri.Body(f"can {k}", ri.Shape.cylinder(0.1, 0.2), position=(0, 0, k)) for k in range(2)]
-    world = compile_scene(ri.Scene(bodies=cans))
-    parts = range(warm_up.NUMBER_OF_PARTS[warm_up.CONTACTS])
-    if not all(warm_up.note_of_cylinders(warm_up.CONTACTS, part).exists() for part in parts):
-        assert warm_up.kernels_to_compile(world, False, False, always) == ["contacts"]
-    for part in parts:
-        with warm_up.start_process(warm_up.CONTACTS, str(part), warm_up.CYLINDERS) as process:
-            assert process.wait() == 0
-    assert warm_up.kernels_to_compile(world, False, False, always) == []
+def test_cylinders_and_rolling_friction_need_no_kernels_of_their_own():
+    """The first scene with a cylinder compiled for 19 s more, and one with rolling friction for 20 s."""
+    run_of_two(ri.Shape.box((0.1, 0.2, 0.2)), 0.0)
+    types = {kernel.name: len(kernel.entry.overloads) for kernel in KERNELS if kernel.calls}
+    run_of_two(ri.Shape.cylinder(0.1, 0.2), 0.001)
+    assert {kernel.name: len(kernel.entry.overloads) for kernel in KERNELS if kernel.name in types} == types
+
+
+def run_of_two(shape: ri.Shape, rolling_friction: float) -> None:
+    """Two bodies of a shape fall onto a floor and each other."""
+    material = ri.Material(rolling_friction=rolling_friction)
+    scene = ri.Scene(bodies=[ri.Body("floor", ri.Shape.half_space(), motion="static")])
+    for k in range(2):
+        scene.add(ri.Body(f"body {k}", shape, position=(0, 0.05 * k, 0.2 + 0.3 * k), material=material))
+    ri.simulate(scene, 0.5)
 
 
 def never(_kernel: Kernel) -> bool:

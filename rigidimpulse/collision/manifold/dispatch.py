@@ -215,13 +215,8 @@ def _is_point(geometry, primitive):
 
 
 @inner
-def _cylinder_contacts(cylinders, geometry, i, j, pose, margin, contacts, count):
-    """Append the contacts of a cylinder i with the primitive j.
-
-    cylinders: None where the scene has no cylinder. Numba removes a branch on an argument that is None before it compiles what is in it.
-    """
-    if cylinders is None:
-        return count
+def _cylinder_contacts(geometry, i, j, pose, margin, contacts, count):
+    """Append the contacts of a cylinder i with the primitive j."""
     if geometry.kind[j] == HALF_SPACE:
         return _cylinder_half_space(geometry, i, j, pose, margin, contacts, count)
     if geometry.kind[j] == ROUND:
@@ -240,7 +235,7 @@ def _primitive_contacts(shapes, i, j, pose, margin, contacts, count):
     if kind[i] == ROUND:
         return _round_half_space(geometry, i, j, pose, margin, contacts, count)
     if kind[i] == CYLINDER:
-        return _cylinder_contacts(shapes.cylinders, geometry, i, j, pose, margin, contacts, count)
+        return _cylinder_contacts(geometry, i, j, pose, margin, contacts, count)
     return count
 
 

@@ -14,8 +14,7 @@ and for D the vector from a corner of A to one of B, f_ij = n.D:   f' = m.D + n.
 |f'''| <= J + 3 nu |y''| + 3 nu^2 |y'| + nu^3 |D|, the lengths bounded over [0, h]. A cylinder whose side touches takes part as its axis, an
 edge grown by its radius: no point of it is outside of that.
 
-Records lie in the arrays `work` and `index` of a `PairScratch`. Kernels whose first argument is its `cylinders` return at once where that
-is None: numba then removes the rest before it compiles. They are never called there.
+Records lie in the arrays `work` and `index` of a `PairScratch`.
 """
 
 from __future__ import annotations
@@ -67,10 +66,8 @@ def _cylinder_record(work, side):
 
 
 @jit
-def _cylinder_top(cylinders, work, side, normal):
+def _cylinder_top(work, side, normal):
     """Return the greatest normal . p over the cylinder of one side."""
-    if cylinders is None:
-        return 0.0
     centre, axis, half_height, radius = _cylinder_record(work, side)
     return dot(normal, centre) + cylinder_support(axis, half_height, radius, normal)
 
@@ -79,15 +76,13 @@ def _cylinder_top(cylinders, work, side, normal):
 def _top(scratch, side, normal):
     """Return the greatest normal . p over the first (0) or second (1) piece."""
     if scratch.index[COUNT + side] == 0:
-        return _cylinder_top(scratch.cylinders, scratch.work, side, normal)
+        return _cylinder_top(scratch.work, side, normal)
     return farthest(scratch.work, CORNER + 9 * side, scratch.index[COUNT + side], normal)
 
 
 @jit
-def _cylinder_carried(cylinders, work, side, normal, level, horizon):
+def _cylinder_carried(work, side, normal, level, horizon):
     """As `_carried`, for a cylinder."""
-    if cylinders is None:
-        return horizon
     other = 1 - side
     seen, origin = SEEN + SEEN_SIZE * side, vector(work, ORIGIN + 3 * other)
     centre, axis, half_height, radius = _cylinder_record(work, other)
@@ -102,7 +97,7 @@ def _carried(scratch, side, normal, view, level, horizon):
     work, index, other = scratch.work, scratch.index, 1 - side
     seen, origin = SEEN + SEEN_SIZE * side, vector(work, ORIGIN + 3 * other)
     if index[COUNT + other] == 0:
-        return _cylinder_carried(scratch.cylinders, work, side, normal, level, horizon)
+        return _cylinder_carried(work, side, normal, level, horizon)
     for k in range(index[COUNT + other]):
         point = vector(work, CORNER + 9 * other + 3 * k)
         gap = dot(normal, point) - level
@@ -148,10 +143,8 @@ def _with_edges(work, index, edges, normal, threshold, horizon):
 
 
 @jit
-def _with_thinned(cylinders, work, index, normal, threshold, horizon):
+def _with_thinned(work, index, normal, threshold, horizon):
     """Safe time of the two pieces along n turning with crossing edges, the sides of cylinders among them; 0 if none cross."""
-    if cylinders is None:
-        return 0.0
     is_side = True
     for side in range(2):
         if index[COUNT + side] == 0:
@@ -175,10 +168,8 @@ def _with_thinned(cylinders, work, index, normal, threshold, horizon):
 
 
 @jit_making_arrays
-def _closest_to_cylinder(cylinders, scratch):
+def _closest_to_cylinder(scratch):
     """As `_closest`, where the second piece is a cylinder."""
-    if cylinders is None:
-        return 0.0, NO_EDGES
     work, index = scratch.work, scratch.index
     centre, axis, half_height, radius = _cylinder_record(work, SECOND)
     points = work[CLOSEST : CLOSEST + GAP]
@@ -200,7 +191,7 @@ def _closest_to_cylinder(cylinders, scratch):
 def _closest(scratch):
     """Write the closest points and the normal of the two pieces at CLOSEST; return (separation, crossing edges)."""
     if scratch.index[COUNT + 1] == 0:
-        return _closest_to_cylinder(scratch.cylinders, scratch)
+        return _closest_to_cylinder(scratch)
     return closest_simplices(scratch.work, scratch.index, CLOSEST)
 
 
@@ -304,7 +295,7 @@ def pieces_safe_until(scratch, threshold, horizon):
     elif edges >= 0:
         best = max(best, _with_edges(work, index, edges, normal, threshold, horizon))
     elif index[COUNT + 1] == 0:
-        best = max(best, _with_thinned(scratch.cylinders, work, index, normal, threshold, horizon))
+        best = max(best, _with_thinned(work, index, normal, threshold, horizon))
     work[CLOSEST + GAP] = separation
     put(work, CLOSEST + DIRECTION, direction)
     return best, carrier

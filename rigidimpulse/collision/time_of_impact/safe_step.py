@@ -18,7 +18,7 @@ import numpy as np
 
 from rigidimpulse.collision.distance.cylinder import basis
 from rigidimpulse.collision.geometry import CYLINDER as CYLINDER_KIND
-from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, Geometry, cylinders_of
+from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, Geometry
 from rigidimpulse.collision.time_of_impact.bvh_walk import NO_NODE, half_space_safe_until, trees_safe_until
 from rigidimpulse.collision.time_of_impact.convex_pieces import pieces_safe_until
 from rigidimpulse.collision.time_of_impact.motion_bound import (
@@ -78,7 +78,6 @@ class SweepScratch(NamedTuple):
     plane: np.ndarray  # (s,) the half space that is all of the shape, or -1
     work: np.ndarray  # (WORK_SIZE,) and
     index: np.ndarray  # (INDEX_SIZE,) int64, see `scratch_layout`
-    cylinders: np.ndarray | None  # (c,) primitives that are cylinders, None where there is none, see `geometry.Shapes`
 
 
 def make_scratch(geometry: Geometry) -> SweepScratch:
@@ -97,7 +96,7 @@ def make_scratch(geometry: Geometry) -> SweepScratch:
             ball[shape] = len(vertices) == 1 and not vertices.any()
             if ball[shape]:
                 reach[shape] = geometry.radius[first]
-    return SweepScratch(reach, ball, plane, np.zeros(WORK_SIZE), np.zeros(INDEX_SIZE, np.int64), cylinders_of(geometry))
+    return SweepScratch(reach, ball, plane, np.zeros(WORK_SIZE), np.zeros(INDEX_SIZE, np.int64))
 
 
 @jit
@@ -145,10 +144,8 @@ def _bounds_safe_until(bound_centre, bound_radius, first, second, work, threshol
 
 
 @jit
-def _half_space_cylinder(cylinders, geometry, second, work, index, normal, level, horizon):
+def _half_space_cylinder(geometry, second, work, index, normal, level, horizon):
     """Safe time of a cylinder of the second body above a level along a normal."""
-    if cylinders is None:
-        return horizon
     frame, radius = geometry.frame, geometry.radius
     _place_cylinder(frame, radius, second, work, index, SECOND)
     point = support_point(geometry, second, FIRST, turned_back(work, ROTATION, scaled(normal, -1.0)))
@@ -170,7 +167,7 @@ def _half_space_pair(geometry, first, second, scratch, threshold, horizon):
     if geometry.kind[second] == ROUND:
         s = half_space_safe_until(geometry, geometry.node_first[second], normal, level + radius[second], scratch, horizon)
     else:
-        s = _half_space_cylinder(scratch.cylinders, geometry, second, work, index, normal, level, horizon)
+        s = _half_space_cylinder(geometry, second, work, index, normal, level, horizon)
     if s < horizon:
         index[CARRIER] = 0
         point = support_point(geometry, second, index[ELEMENT_B], down)

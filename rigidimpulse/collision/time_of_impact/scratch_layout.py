@@ -65,8 +65,7 @@ stack of pairs of nodes, with the depth at which the last opened pair lay."""
 
 
 class PairScratch(NamedTuple):
-    """The two arrays, and whether there are cylinders."""
+    """The two arrays."""
 
     work: np.ndarray  # (WORK_SIZE,)
     index: np.ndarray  # (INDEX_SIZE,) int64
-    cylinders: np.ndarray | None  # as in `geometry.Shapes`: where it is None, kernels of cylinders are not compiled

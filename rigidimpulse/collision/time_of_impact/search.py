@@ -109,7 +109,7 @@ def first_contacts(geometry, trajectory, scratch, shape_of_body, pairs, end, eff
     """Fill in `result` (`ImpactTimes`); end: of the step, s, scratch: `SweepScratch`, pairs: `PairsToSweep`, effort: `SearchEffort`."""
     start, impact_margin, tolerance = pairs.start, pairs.impact_margin, pairs.tolerance
     ahead, max_queries = effort
-    work, pair_scratch = scratch.work, PairScratch(scratch.work, scratch.index, scratch.cylinders)
+    work, pair_scratch = scratch.work, PairScratch(scratch.work, scratch.index)
     for k in range(pairs.a.shape[0]):
         a, b = pairs.a[k], pairs.b[k]
         shape_a, shape_b = shape_of_body[a], shape_of_body[b]

@@ -125,7 +125,7 @@ def hold_contacts(solve, problem, sub_step, force, wrench, rolling):
     """Contact forces over a `SubStep` for m contacts, as `Held`.
 
     solve: as in `slip.solve_rows`; problem: a `ContactProblem`; force (m, 3) in (n, t1, t2) [N], start and answer; wrench (n, 6): force and
-    torque on the members are added; rolling: their rolling friction, None if there is none.
+    torque on the members are added; rolling: their `Rolling`.
     May change velocities: contacts that leave slowly stick.
     """
     contacts, h = problem.contacts, sub_step.length
@@ -142,8 +142,7 @@ def hold_contacts(solve, problem, sub_step, force, wrench, rolling):
     if slips.first.shape[0] > 0 and residual <= POOR and any_stops(rows, problem.members.shape[0], slips, SLIP * found.scale):
         residual, h = end_at_stop(problem, sub_step, of_contacts, slips, found)
     world_force = add_contact_wrench(contacts, rows, first_row, frames, h, force, wrench)
-    if rolling is not None:
-        add_rolling_wrench(contacts, rolling, rows, frames, h, rows.bias.shape[0] - extra, wrench)
+    add_rolling_wrench(contacts, rolling, rows, frames, h, rows.bias.shape[0] - extra, wrench)
     return Held(residual, h, found.slides, world_force)
 
 
@@ -161,8 +160,7 @@ def attempt(solve, problem, of_contacts, excess, h, rolling):
     """Solve the rows over the length h; `rows.impulse` is start and answer. Other arguments as in `hold_contacts`."""
     contacts, rows, m = problem.contacts, of_contacts.rows, of_contacts.first_row.shape[0]
     scale, u = fill_contact_bias(problem, excess, h, of_contacts)
-    if rolling is not None:
-        fill_rolling_rows(problem, rolling, h, of_contacts, rows.bias.shape[0] - count_rolling_rows(rolling))
+    fill_rolling_rows(problem, rolling, h, of_contacts, rows.bias.shape[0] - count_rolling_rows(rolling))
     slides = np.empty(m, np.bool_)
     for c in range(m):
         slides[c] = contacts.static_friction[c] > 0.0 and abs(u[c, 1]) + abs(u[c, 2]) > SLIP * scale

@@ -176,7 +176,7 @@ def _end_values(island, acceleration, wrench, h, value):
 
 def hold_jointed(
     solve: RowSolver | None, problem: ContactProblem, island: JointedIsland, h: float, force: np.ndarray, wrench: np.ndarray,
-    moment: np.ndarray, rolling: Rolling | None,
+    moment: np.ndarray, rolling: Rolling,
 ) -> tuple[float, float]:
     """Forces of joints and lasting contacts over a sub-step of length h.
 
@@ -188,8 +188,7 @@ def hold_jointed(
     of_contacts = contact_rows(island.bodies, contacts, island.members, island.number, extra + count)
     rows, first_row, _ = of_contacts
     start = len(rows.bias) - count
-    if rolling is not None:
-        fill_rolling_rows(problem, rolling, h, of_contacts, start - extra)
+    fill_rolling_rows(problem, rolling, h, of_contacts, start - extra)
     start_contact_impulses(rows, first_row, force, h)
     direction, beta = start_joint_rows(island, h, rows, start)
     scale, u = fill_contact_bias(problem, np.zeros(len(first_row)), h, of_contacts)

@@ -25,7 +25,7 @@ from rigidimpulse.dynamics.constraints.rows import DISC, DISC_SECOND, SEGMENT, w
 
 
 class Rolling(NamedTuple):
-    """Rolling and spinning friction of m contacts."""
+    """Rolling and spinning friction of m contacts, of none of them where no material asks for any."""
 
     rolling: np.ndarray  # (m,) b, m
     spinning: np.ndarray  # (m,) s, m
@@ -36,11 +36,9 @@ class Rolling(NamedTuple):
 def rolling_of(coefficients, material, bodies, contacts):
     """The `Rolling` of m contacts.
 
-    coefficients: (k, k, 2) m of pairs of materials, None where no material asks for any: then the answer is None; material (n,) of bodies.
+    coefficients: (k, k, 2) m of pairs of materials, with k = 0 where no material asks for any: then there is none; material (n,) of bodies.
     """
-    if coefficients is None:
-        return None
-    m = contacts.gap.shape[0]
+    m = contacts.gap.shape[0] if coefficients.shape[0] > 0 else 0
     rolling, spinning, lever = np.zeros(m), np.zeros(m), np.zeros(m)
     for c in range(m):
         a, b = contacts.body_a[c], contacts.body_b[c]
@@ -55,9 +53,7 @@ def rolling_of(coefficients, material, bodies, contacts):
 
 @jit
 def count_rolling_rows(rolling):
-    """Rows that `fill_rolling_rows` will fill; rolling: a `Rolling` or None."""
-    if rolling is None:
-        return 0
+    """Rows that `fill_rolling_rows` will fill; rolling: a `Rolling`."""
     count = 0
     for c in range(rolling.lever.shape[0]):
         count += (2 if rolling.rolling[c] > 0.0 else 0) + (1 if rolling.spinning[c] > 0.0 else 0)
@@ -73,7 +69,7 @@ def fill_rolling_rows(problem, rolling, h, of_contacts, start):
     bodies, contacts, number = problem.bodies, problem.contacts, problem.number
     rows, first_row, frames = of_contacts.rows, of_contacts.first_row, of_contacts.frames
     i = start
-    for c in range(first_row.shape[0]):
+    for c in range(rolling.lever.shape[0]):
         lever = rolling.lever[c]
         for k in range(3):
             bound = rolling.spinning[c] if k == 0 else rolling.rolling[c]
@@ -104,7 +100,7 @@ def fill_rolling_rows(problem, rolling, h, of_contacts, start):
 def add_rolling_wrench(contacts, rolling, rows, frames, h, start, wrench):
     """Moments of the rows' impulses over h, on both bodies of each contact, added to wrench."""
     i = start
-    for c in range(frames.shape[0]):
+    for c in range(rolling.lever.shape[0]):
         for k in range(3):
             if not (rolling.spinning[c] if k == 0 else rolling.rolling[c]) > 0.0:
                 continue
@@ -120,7 +116,7 @@ def add_rolling_slips(problem, rolling, of_contacts, slow, slips, count):
     """Add to `count` slips (`stop_split.Slips`) what rolls and spins faster than `slow` [m/s]; returns how many there are then."""
     contacts, frames, w = problem.contacts, of_contacts.frames, problem.bodies.angular_velocity
     i = of_contacts.rows.bias.shape[0] - count_rolling_rows(rolling)
-    for c in range(frames.shape[0]):
+    for c in range(rolling.lever.shape[0]):
         a, b, lever = contacts.body_a[c], contacts.body_b[c], rolling.lever[c]
         x, y, z = lever * (w[b, 0] - w[a, 0]), lever * (w[b, 1] - w[a, 1]), lever * (w[b, 2] - w[a, 2])
         if rolling.spinning[c] > 0.0:

@@ -38,18 +38,17 @@ class Slips(NamedTuple):
 def find_slips(problem, of_contacts, slides, velocity, rolling, slow):
     """The `Slips` of contacts that slip, slides (m,) bool, at velocity (m, 3) along their frames, and of their rolling friction.
 
-    problem: a `ContactProblem`; of_contacts: `ContactRows`; rolling: a `Rolling` or None; slow: rolling that is none, m/s.
+    problem: a `ContactProblem`; of_contacts: `ContactRows`; rolling: a `Rolling`; slow: rolling that is none, m/s.
     """
     first_row, m, count = of_contacts.first_row, slides.shape[0], 0
-    capacity = m if rolling is None else 3 * m
+    capacity = m + 2 * rolling.lever.shape[0]
     slips = Slips(np.empty(capacity, np.int64), np.empty(capacity, np.int64), np.empty((capacity, 2)))
     for c in range(m):
         if slides[c]:
             slips.first[count], slips.second[count] = first_row[c] + 1, first_row[c] + 2
             slips.velocity[count, 0], slips.velocity[count, 1] = velocity[c, 1], velocity[c, 2]
             count += 1
-    if rolling is not None:
-        count = add_rolling_slips(problem, rolling, of_contacts, slow, slips, count)
+    count = add_rolling_slips(problem, rolling, of_contacts, slow, slips, count)
     return Slips(slips.first[:count], slips.second[:count], slips.velocity[:count])
 
 

@@ -138,10 +138,8 @@ def _hold_jointed(
     return h, residual
 
 
-def _rolling(run: Run, problem: ContactProblem) -> Rolling | None:
-    """Rolling friction of the contacts, None where no material asks for any."""
-    if run.world.rolling is None:
-        return None
+def _rolling(run: Run, problem: ContactProblem) -> Rolling:
+    """Rolling friction of the contacts."""
     return rolling_of(run.world.rolling, run.world.material_of_body, problem.bodies, problem.contacts)
 
 

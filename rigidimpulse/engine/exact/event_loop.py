@@ -147,7 +147,7 @@ class Loop(NamedTuple):
     bodies: PairBodies
     margins: Margins
     coefficients: np.ndarray  # (k, k, 4), see material.combine
-    rolling: np.ndarray | None  # (k, k, 2) m, None where no material asks for it
+    rolling: np.ndarray  # (k, k, 2) m, k = 0 where no material asks for it
     elsewhere: np.ndarray  # (n,) bool, bodies that the loop in Python looks after
     motion: Motion
     table: PairTable

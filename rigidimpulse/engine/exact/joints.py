@@ -326,7 +326,7 @@ class JointState:
         return math.sqrt(max(others, default=0.0)), math.sqrt(max(own, default=0.0))
 
     def hold(
-        self, run: Run, island: Island, contacts: Contacts, turning: np.ndarray, force: np.ndarray, rest: float, rolling: Rolling | None
+        self, run: Run, island: Island, contacts: Contacts, turning: np.ndarray, force: np.ndarray, rest: float, rolling: Rolling
     ) -> tuple[float, float]:
         """Forces into run.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
         state, memory = run.state, self.memory

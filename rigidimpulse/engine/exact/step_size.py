@@ -114,7 +114,7 @@ def hold_turning(solve, load, problem, turning, estimate, limits, forces, rollin
     """Contact forces over a sub-step of at most `limits.rest`, as `Held`.
 
     solve: as in `slip.solve_rows`; load: None, or h -> h: it loads the bodies for a sub-step of h s and says how long that may be; problem:
-    a `ContactProblem`; turning: `Turning`; estimate: `ErrorEstimate`; limits: `StepLimits`; forces: `Forces`; rolling: a `Rolling` or None.
+    a `ContactProblem`; turning: `Turning`; estimate: `ErrorEstimate`; limits: `StepLimits`; forces: `Forces`; rolling: a `Rolling`.
     """
     step, first, m = limits.step, problem.members[0], turning.contact_margin.shape[0]
     excess, shortest = np.zeros(m), SHORTEST_STOP * step

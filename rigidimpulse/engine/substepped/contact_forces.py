@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -368,7 +370,7 @@ class ContactStepper:
             self._more_buffers.append(ContactBuffer(self._sharing.buffer))
         buffers = [run.contact_buffer, *self._more_buffers][: len(shares)]
         a, b = self.order[first], self.order[second]
-        shapes = Shapes(self.geometry, world.shape_of_body, world.cylinders)
+        shapes = Shapes(self.geometry, world.shape_of_body)
         questions = [Question(shapes, now, rotation, PairQuery(a[some], b[some], shown[some])) for some in shares]
         found = find_together(buffers, questions)
         smaller = SmallerShapes(world.geometry, self.geometry, self._factor, self._back, self._depth, self._convex, self._solids)
@@ -472,19 +474,28 @@ class ContactStepper:
         h = (end - time) / self.sub_steps
         self.begin_step()
         self._steady = _NO_STEADY
-        for part, some in enumerate(self.sub_steps_of_parts()):
-            if part:
-                self._look_again(run)
+        for some in self.sub_steps_between(partial(self._look_again, run)):
             self._advance(some, h)
         note_pressed(self.bodies, self.order, self.pressed)
         out = self.end_step()
         out.given[:] = 0.0
         return out
 
-    def sub_steps_of_parts(self) -> list[int]:
-        """Sub-steps of each part of the step, between which contacts are looked for again."""
-        edges = [part * self.sub_steps // self.parts for part in range(self.parts + 1)]
-        return np.diff(edges).tolist()
+    def sub_steps_between(self, look_again: Callable[[], None]) -> Iterator[int]:
+        """Sub-steps from look to look, of a step that begins with a look; in between it looks again.
+
+        What a look has found may be faster than what was known when the parts of the step were made: then a part is cut into more.
+        """
+        looked = True
+        for part in range(self.parts):
+            length = left = (part + 1) * self.sub_steps // self.parts - part * self.sub_steps // self.parts
+            while left:
+                if not looked:
+                    look_again()
+                motion = most_motion(self.bodies, self.table.pairs, self.ahead * left / length)
+                some = min(max(left // max(math.ceil(motion / COARSEST), 1), LEAST_SUB_STEPS_BETWEEN), left)
+                yield some
+                left, looked = left - some, False
 
     def begin_step(self) -> None:
         """Remember the energies of the members."""

@@ -107,11 +107,13 @@ class JointedStepper:
     def _sub_steps(self, run: Run, island: JointedIsland, kept: Kept, given: GivenImpulses, h: float) -> float:
         """All sub-steps of h s; kept: see `step_island`. Returns the worst gap of a joint, m or rad."""
         stepper, worst = self._stepper, 0.0
-        for part, some in enumerate(stepper.sub_steps_of_parts()):
-            if part:
-                self._hand_over(island.members)
-                stepper.look_again_at_all(run)
-                given.forget(stepper)
+
+        def look_again() -> None:
+            self._hand_over(island.members)
+            stepper.look_again_at_all(run)
+            given.forget(stepper)
+
+        for some in stepper.sub_steps_between(look_again):
             halved, gap = step_island(
                 island, stepper.bodies, stepper.table.arrays, self._world.coefficients, stepper.balance, kept, some, h
             )
