@@ -194,6 +194,34 @@ def test_energy_of_nothing_names_the_body_that_got_it() -> None:
     assert fault.time == run.times[20] and fault.bodies[0] == "box 1"
 
 
+@pytest.mark.parametrize("fps", [480.0, 110.0, 60.0, 1000.0 / 41.0])
+def test_frames_inside_sub_stepped_steps_hide_no_energy_and_make_none(fps: float) -> None:
+    """Bodies that rebound are slow in the middle of a step: at 480 fps, 73 of 250 sound runs said that up to 5 % were made of nothing.
+
+    Kicks that give 2 % of the energy from a frame on are found at all rates.
+    """
+    for seed in range(4):
+        run = _boards_that_hit(seed, fps)
+        assert run.status.ok, run.status.message
+        frame = 2 * len(run.times) // 3
+        faster = np.where(np.arange(len(run.times)) >= frame, 1.01, 1.0)[:, None, None]
+        record = recorded(run, velocity=run.velocities * faster, angular_velocity=run.angular_velocities * faster)
+        fault = next(fault for fault in measured_faults(record) if fault.kind == "energy made")
+        assert run.times[frame] <= fault.time <= run.times[frame] + 2.0 / min(fps, 60.0)
+        assert fault.amount > 0.005 * run.ledger.kinetic[-1]
+
+
+def _boards_that_hit(seed: int, fps: float) -> ri.Recording:
+    """Two boards that turn meet in space, and rebound as sub-stepped bodies."""
+    random = np.random.default_rng(seed)
+    scene, shape = ri.Scene(gravity=(0, 0, 0)), ri.Shape.box((0.2, 0.12, 0.03))
+    for name, place, speed in (("a", (0, 0, 0), 0.0), ("b", (0.24, 0.02, 0.01), -2.0)):
+        turn, spin = random.normal(size=4), random.normal(0.0, 5.0, 3)
+        material = ri.Material(restitution=0.3)
+        scene.add(ri.Body(name, shape, position=place, orientation=turn, velocity=(speed, 0, 0), angular_velocity=spin, material=material))
+    return ri.simulate(scene, 0.5, accuracy=ri.Accuracy(contact_solver="substepped"), fps=fps)
+
+
 @pytest.mark.parametrize(("part", "raised", "is_said"), [(0.04, 0.0, False), (0.06, 0.0, True), (0.06, 0.02, False)])
 def test_energy_that_a_run_took_back_is_said(part: float, raised: float, is_said: bool) -> None:
     """A twentieth of the energy that moves is the bound; it was taken in one frame, and box 2 loses most there.

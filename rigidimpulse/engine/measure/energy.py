@@ -30,7 +30,11 @@ may give energy, a third balance takes their place: that of the energy seen from
 
 with p the momentum and m the mass of all, and a the steady accelerations.
 
-The rise is that of any balance over its least value so far. It is compared with the energy that moves,
+The rise is that of any balance over its least value so far. Between the ends of steps of sub-stepped islands frames have no state of the
+solver: paths are polynomials there, and a body that rebounds is slow on the way. At such frames the least value is the greatest of all
+that are a step away at most, and what is compared with it the least of these.
+
+The rise is compared with the energy that moves,
 
     rise <= RISE S + A,    S = max K + (max V - min V) + sum of (max D_c - min D_c) over the causes that are added + sum of m u^2 / 2
 
@@ -39,7 +43,10 @@ with the speed u up to which a body stands still (`RunRecord.unseen_speed`): whe
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from rigidimpulse.collision.manifold.shrunk_shapes import inner_radii
 from rigidimpulse.core.tolerances import TOLERANCES
@@ -53,6 +60,8 @@ RISE: float = 1e-3
 GAP: float = 0.6 * TOLERANCES.sub_stepping.skin
 """Gap to which sub-stepped contacts are moved apart, of the inner radius: a fifth of the skin, and three times that, since wedges go up by
 more than their gaps."""
+SAME_TIME: float = 1e-6
+"""Times that are nearer than that are the same, steps."""
 MOST_NAMES: int = 3
 """Bodies that a message names at most."""
 MOST_OF_RISE: float = 0.1
@@ -102,13 +111,30 @@ def energy_rise(record: RunRecord) -> tuple[np.ndarray, float]:
             moved += float(np.ptp(taken))
     rise = np.zeros(len(given))
     if not record.may_be_sub_stepped:
-        rise = all_causes - np.minimum.accumulate(all_causes)
+        rise = _rise_of(record, all_causes)
     if not record.may_be_sub_stepped or "sub-stepping" in takes:
-        rise = np.maximum(rise, given - np.minimum.accumulate(given))
+        rise = np.maximum(rise, _rise_of(record, given))
     seen = _seen_from_supports(record)
     if seen is not None:
-        rise = np.maximum(rise, seen - np.minimum.accumulate(seen))
+        rise = np.maximum(rise, _rise_of(record, seen))
     return rise, moved
+
+
+def _rise_of(record: RunRecord, balance: np.ndarray) -> np.ndarray:
+    """Rise (f,) J of a balance (f,) over its least value so far."""
+    low, high, inside = balance.copy(), balance.copy(), _inside_steps(record)
+    if inside.any():
+        steps = record.world.accuracy.step / np.diff(record.frames.times).min()
+        reach = math.ceil(steps - SAME_TIME)
+        around = sliding_window_view(np.pad(balance, reach, mode="edge"), 2 * reach + 1)[inside]
+        low[inside], high[inside] = around.max(axis=1), around.min(axis=1)
+    return np.maximum(high - np.minimum.accumulate(low), 0.0)
+
+
+def _inside_steps(record: RunRecord) -> np.ndarray:
+    """Frames (f,) bool between the ends of steps of sub-stepped islands."""
+    steps = (record.frames.times - record.frames.times[0]) / record.world.accuracy.step
+    return (np.abs(steps - np.round(steps)) > SAME_TIME) & record.may_be_sub_stepped
 
 
 def _seen_from_supports(record: RunRecord) -> np.ndarray | None:
