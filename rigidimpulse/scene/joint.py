@@ -240,7 +240,7 @@ class FixedJoint(Joint):
 
     Attributes:
         anchor: (3,) m, where the force acts, in the world, as the scene starts; by default the centre of mass of b (of a, if b is None).
-        The others: see `Joint`; bounds mean nothing here.
+        The others: see `Joint`; there is nothing that lower and upper could bound.
 
     """
 
@@ -256,6 +256,9 @@ class FixedJoint(Joint):
 
     def rows(self, _distance: float) -> list[Row]:
         """See `Joint`."""
+        for name, value in (("lower", self.lower), ("upper", self.upper)):
+            if value is not None:
+                raise SceneError(f"{name} = {value}", "a fixed joint leaves no motion to bound: leave it out, or use a hinge or a slider")
         return [Row(code + k) for code in (ALONG, ABOUT) for k in range(3)]
 
 

@@ -230,6 +230,7 @@ def test_pair_on_a_slider_that_spins_in_free_space_keeps_energy_and_angular_mome
         (ri.HingeJoint(None, "load", (0, 0, 0), (0, 0, 0)), "axis"),
         (ri.BallJoint("load", "load", (0, 0, 0)), "itself"),
         (ri.HingeJoint(None, "load", (0, 0, 0), (0, 0, 1), lower=1.0, upper=0.0), "lower"),
+        (ri.FixedJoint(None, "load", upper=1.0), "no motion to bound"),
         (ri.DistanceJoint(None, "load", (0, 0, 0), (0, 0, 0)), "length"),
         (ri.BallJoint(None, "load", (0, 0, float("nan"))), "anchor"),
         (ri.BallJoint(None, "load", (0, 0, 0), break_force=-1.0), "break_force = -1.0"),
