@@ -23,6 +23,7 @@ from rigidimpulse.collision.distance.epa import Polytope, make_polytope
 from rigidimpulse.collision.distance.gjk import Simplex, make_simplex
 from rigidimpulse.collision.geometry import HALF_SPACE, Geometry
 from rigidimpulse.collision.manifold.hull_faces import faces
+from rigidimpulse.collision.manifold.reduce import GAP_WEIGHT
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.portable import dot
 from rigidimpulse.core.tolerances import TOLERANCES
@@ -213,16 +214,21 @@ def _reach(corners: np.ndarray) -> float:
 
 @inlined
 def four_of(points, height, count, chosen):
-    """Choose up to four points (count, 3) that can carry the load of all: writes their places to chosen (4,), returns their number."""
+    """Choose up to four points (count, 3) that can carry the load of all: writes their places to chosen (4,), returns their number.
+
+    They are the deepest, the one farthest from it, and the farthest from the line through both on either side. What is higher (count,) m
+    than the deepest counts as less far out, see `reduce`: a corner 7 mm above a floor took the place of one 0.3 mm above it.
+    """
     deepest = 0
     for k in range(1, count):
         if height[k] < height[deepest]:
             deepest = k
-    farthest, distance = deepest, 0.0
+    farthest, distance, best = deepest, 0.0, -inf
     for k in range(count):
         d = (points[k, 0] - points[deepest, 0]) ** 2 + (points[k, 1] - points[deepest, 1]) ** 2 + (points[k, 2] - points[deepest, 2]) ** 2
-        if d > distance:
-            farthest, distance = k, d
+        place = sqrt(d) - GAP_WEIGHT * (height[k] - height[deepest])
+        if d > 0.0 and place > best:
+            farthest, distance, best = k, d, place
     chosen[0] = deepest
     if distance == 0.0:
         return np.int64(1)
@@ -231,7 +237,7 @@ def four_of(points, height, count, chosen):
     ez = points[farthest, 2] - points[deepest, 2]
     # Twice the area of the triangle that a point makes with the first two, signed by a first one that has any.
     mx, my, mz, least, is_flat = 0.0, 0.0, 0.0, 1e-9 * distance, True
-    high, low, most, lowest = -1, -1, least, -least
+    high, low, most, lowest, open_by = -1, -1, -inf, inf, GAP_WEIGHT * sqrt(distance)
     for k in range(count):
         x, y, z = points[k, 0] - points[deepest, 0], points[k, 1] - points[deepest, 1], points[k, 2] - points[deepest, 2]
         cx, cy, cz = ey * z - ez * y, ez * x - ex * z, ex * y - ey * x
@@ -241,10 +247,11 @@ def four_of(points, height, count, chosen):
                 continue
             mx, my, mz, is_flat = cx / area, cy / area, cz / area, False
         signed = mx * cx + my * cy + mz * cz
-        if signed > most:
-            high, most = k, signed
-        elif signed < lowest:
-            low, lowest = k, signed
+        place = open_by * (height[k] - height[deepest])
+        if signed > least and signed - place > most:
+            high, most = k, signed - place
+        elif signed < -least and signed + place < lowest:
+            low, lowest = k, signed + place
     number = np.int64(2)
     for k in (high, low):
         if k >= 0:
