@@ -493,7 +493,9 @@ class ContactStepper:
                 if not looked:
                     look_again()
                 motion = most_motion(self.bodies, self.table.pairs, self.ahead * left / length)
-                some = min(max(left // max(math.ceil(motion / COARSEST), 1), LEAST_SUB_STEPS_BETWEEN), left)
+                # Speeds may be no numbers by now: the end of the step finds them.
+                pieces = max(math.ceil(min(left, motion / COARSEST)), 1)
+                some = min(max(left // pieces, LEAST_SUB_STEPS_BETWEEN), left)
                 yield some
                 left, looked = left - some, False
 
