@@ -235,6 +235,22 @@ def most_motion(bodies, pairs, ahead):
 
 
 @jit
+def most_turn(bodies, pairs, cornered, ahead):
+    """Greatest angle [rad] by which bodies of general pairs that take part and have contacts turn against each other in `ahead` s.
+
+    cornered (n,): which bodies have corners; pairs of others are left out.
+    """
+    part, count, velocity, most = bodies.part, pairs.count, bodies.velocity, 0.0
+    for p in range(pairs.first.shape[0]):
+        a, b = pairs.first[p], pairs.second[p]
+        if count[p] > 0 and pairs.kind[p] == GENERAL and cornered[a] and cornered[b] and in_play(part, a, b):
+            x, y, z = velocity[8 * b + 3], velocity[8 * b + 4], velocity[8 * b + 5]
+            x, y, z = x - velocity[8 * a + 3], y - velocity[8 * a + 4], z - velocity[8 * a + 5]
+            most = max(most, ahead * sqrt(x * x + y * y + z * z))
+    return most
+
+
+@jit
 def most_approach(bodies, pairs, ahead, fall):
     """Greatest relative motion in `ahead` s of the pairs that may meet in that time, in the farthest that contacts are looked for."""
     part, x, radius, most = bodies.part, bodies.position, bodies.radius, 0.0

@@ -216,8 +216,9 @@ def _reach(corners: np.ndarray) -> float:
 def four_of(points, height, count, chosen):
     """Choose up to four points (count, 3) that can carry the load of all: writes their places to chosen (4,), returns their number.
 
-    They are the deepest, the one farthest from it, and the farthest from the line through both on either side. What is higher (count,) m
-    than the deepest counts as less far out, see `reduce`: a corner 7 mm above a floor took the place of one 0.3 mm above it.
+    They are the deepest, the one farthest from it, and the farthest from the line through both on either side; where all are on one side,
+    the fourth is the one farthest outside of the triangle of the three. What is higher (count,) m than the deepest counts as less far out,
+    see `reduce`: a corner 7 mm above a floor took the place of one 0.3 mm above it.
     """
     deepest = 0
     for k in range(1, count):
@@ -257,6 +258,23 @@ def four_of(points, height, count, chosen):
         if k >= 0:
             chosen[number] = k
             number += 1
+    if number < 3 or number == 4:
+        return number
+    # The sides of the triangle that begin at the second and the third point; what lies beyond the other one would have been chosen.
+    third, turn, outermost, best = chosen[2], 1.0 if high >= 0 else -1.0, -1, -inf
+    for begin, end in ((farthest, third), (third, deepest)):
+        ex, ey = points[end, 0] - points[begin, 0], points[end, 1] - points[begin, 1]
+        ez = points[end, 2] - points[begin, 2]
+        side = sqrt(ex * ex + ey * ey + ez * ez)
+        for k in range(count):
+            x, y, z = points[k, 0] - points[begin, 0], points[k, 1] - points[begin, 1], points[k, 2] - points[begin, 2]
+            out = -turn * (mx * (ey * z - ez * y) + my * (ez * x - ex * z) + mz * (ex * y - ey * x))
+            place = out / side - GAP_WEIGHT * (height[k] - height[deepest])
+            if out > least and place > best:
+                outermost, best = k, place
+    if outermost >= 0:
+        chosen[3] = outermost
+        number = np.int64(4)
     return number
 
 

@@ -34,7 +34,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import root_scalar
 
-from rigidimpulse.collision.geometry import CYLINDER
 from rigidimpulse.collision.manifold.penetrating_points import find_points
 from rigidimpulse.collision.manifold.penetrating_surface import BodyPoses, PointBuffer, Solids, inward_axes, solid_geometry
 from rigidimpulse.core.kernels import jit, jit_making_arrays
@@ -163,7 +162,7 @@ class PenaltyForces(ForceTable):
         self.is_steady = not world.moving.any()
         self._world, self._carried = world, np.flatnonzero(~world.dynamic)
         # Cylinders take part as prisms: the method needs corners and faces.
-        geometry = solid_geometry(world.shapes) if np.any(world.geometry.kind == CYLINDER) else world.geometry
+        geometry = solid_geometry(world.shapes)
         self._solids = Solids(geometry, *inward_axes(geometry))
         self._pairs = pairs
         self.stiffness = _stiffness(world, self._pairs)

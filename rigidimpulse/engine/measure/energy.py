@@ -46,7 +46,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from rigidimpulse.collision.manifold.shrunk_shapes import inner_radii
 from rigidimpulse.core.tolerances import TOLERANCES
@@ -126,8 +125,9 @@ def _rise_of(record: RunRecord, balance: np.ndarray) -> np.ndarray:
     if inside.any():
         steps = record.world.accuracy.step / np.diff(record.frames.times).min()
         reach = math.ceil(steps - SAME_TIME)
-        around = sliding_window_view(np.pad(balance, reach, mode="edge"), 2 * reach + 1)[inside]
-        low[inside], high[inside] = around.max(axis=1), around.min(axis=1)
+        padded = np.pad(balance, reach, mode="edge")
+        around = np.stack([padded[k : k + len(balance)] for k in range(2 * reach + 1)])
+        low[inside], high[inside] = around.max(axis=0)[inside], around.min(axis=0)[inside]
     return np.maximum(high - np.minimum.accumulate(low), 0.0)
 
 
