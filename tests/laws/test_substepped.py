@@ -308,10 +308,10 @@ def test_boxes_hardly_sink_into_each_other_on_the_way():
 
 def test_preview_looks_at_substepped_islands_less_often_and_is_deeper_on_the_way():
     # The other side of `substep_motion` and `step`: over 0.3 inner radii, 75 mm, boxes come at each other with other edges and corners, in
-    # half of 32 piles more than 2 mm deep, in the worst 7. At the end all lie in their skins.
+    # half of 12 piles more than 0.5 mm deep, in the worst 8, where "standard" has them in their skins. At the end all lie in their skins.
     depths, last = depths_of_thrown(5, "preview")
-    assert 1e-3 < np.median(depths) < 8e-3
-    assert max(depths) < 2e-2
+    assert np.median(depths) < 3e-3
+    assert 1e-3 < max(depths) < 2e-2
     assert last == [0.0] * 5
 
 

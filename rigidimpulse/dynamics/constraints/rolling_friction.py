@@ -32,6 +32,10 @@ class Rolling(NamedTuple):
     lever: np.ndarray  # (m,) L, m
 
 
+NO_ROLLING = Rolling(*np.zeros((3, 0)))
+"""Where no material asks for any."""
+
+
 @jit_making_arrays
 def rolling_of(coefficients, material, bodies, contacts):
     """The `Rolling` of m contacts.

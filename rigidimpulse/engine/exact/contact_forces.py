@@ -14,7 +14,7 @@ from rigidimpulse.dynamics.constraints.contact import ContactProblem, Held
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
 from rigidimpulse.dynamics.constraints.position_correction import Sunk, correct_positions, needs_correction
-from rigidimpulse.dynamics.constraints.rolling_friction import Rolling, rolling_of
+from rigidimpulse.dynamics.constraints.rolling_friction import NO_ROLLING, Rolling, rolling_of
 from rigidimpulse.dynamics.energy import kinetic_energy, kinetic_of, mechanical_energy
 from rigidimpulse.engine.exact.energy_limit import limit_correction_energy, note_hold
 from rigidimpulse.engine.exact.step_size import Forces, StepLimits, Turning, estimate_error, hold_turning, sub_step, turns
@@ -140,6 +140,8 @@ def _hold_jointed(
 
 def _rolling(run: Run, problem: ContactProblem) -> Rolling:
     """Rolling friction of the contacts."""
+    if not run.world.rolling.size:
+        return NO_ROLLING
     return rolling_of(run.world.rolling, run.world.material_of_body, problem.bodies, problem.contacts)
 
 
