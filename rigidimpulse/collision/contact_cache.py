@@ -238,7 +238,7 @@ def most_motion(bodies, pairs, ahead):
 def most_turn(bodies, pairs, cornered, ahead):
     """Greatest angle [rad] by which bodies of general pairs that take part and have contacts turn against each other in `ahead` s.
 
-    cornered (n,): which bodies have corners; pairs of others are left out.
+    cornered (n,): which bodies have corners or rims; pairs of others are left out.
     """
     part, count, velocity, most = bodies.part, pairs.count, bodies.velocity, 0.0
     for p in range(pairs.first.shape[0]):

@@ -25,8 +25,6 @@ from rigidimpulse.scene.scene import Scene, validate
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.forces.force import Force, ForceTable
 
-_NO_ROLLING = np.zeros((0, 0, 2))
-"""Rolling friction where no material asks for any."""
 
 def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out: frozenset[str] = frozenset()) -> World:
     """Check a scene and compile it, without the effects whose names are in `left_out`.
@@ -74,7 +72,7 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
         static_max=high,
         material_of_body=material_of_body,
         coefficients=coefficients,
-        rolling=_NO_ROLLING if "rolling friction" in left_out else rolling,
+        rolling=rolling[:0, :0] if "rolling friction" in left_out else rolling,
         flat=_has_faces(geometry, shape_of_body),
         half_space=np.array([_all_half_spaces(geometry, k) for k in shape_of_body], bool),
         ball=np.array([_is_ball(geometry, k) for k in shape_of_body], bool),
@@ -269,10 +267,10 @@ def _has_faces(geometry: Geometry, shape_of_body: np.ndarray) -> np.ndarray:
 
 
 def _materials(bodies: list[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Index of each body's material, the combined coefficients of all pairs of materials, and their rolling friction."""
+    """Index of each body's material, the coefficients of all pairs of materials, and their rolling friction (empty if none has any)."""
     unique = list(dict.fromkeys(body.material for body in bodies))
     index = np.array([unique.index(body.material) for body in bodies], np.int64)
     coefficients = np.array([[combine(a, b) for b in unique] for a in unique], float)
     rolling = np.array([[combine_rolling(a, b) for b in unique] for a in unique], float)
-    k = len(unique)
-    return index, coefficients.reshape(k, k, 4), rolling.reshape(k, k, 2) if rolling.any() else _NO_ROLLING
+    k, rolls = len(unique), len(unique) if rolling.any() else 0
+    return index, coefficients.reshape(k, k, 4), rolling.reshape(k, k, 2)[:rolls, :rolls]

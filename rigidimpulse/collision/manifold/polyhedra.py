@@ -248,34 +248,44 @@ def four_of(points, height, count, chosen):
                 continue
             mx, my, mz, is_flat = cx / area, cy / area, cz / area, False
         signed = mx * cx + my * cy + mz * cz
-        place = open_by * (height[k] - height[deepest])
-        if signed > least and signed - place > most:
-            high, most = k, signed - place
-        elif signed < -least and signed + place < lowest:
-            low, lowest = k, signed + place
+        less = open_by * (height[k] - height[deepest])
+        if signed > least and signed - less > most:
+            high, most = k, signed - less
+        elif signed < -least and signed + less < lowest:
+            low, lowest = k, signed + less
     number = np.int64(2)
     for k in (high, low):
         if k >= 0:
             chosen[number] = k
             number += 1
-    if number < 3 or number == 4:
-        return number
-    # The sides of the triangle that begin at the second and the third point; what lies beyond the other one would have been chosen.
-    third, turn, outermost, best = chosen[2], 1.0 if high >= 0 else -1.0, -1, -inf
-    for begin, end in ((farthest, third), (third, deepest)):
+    if number == 3:
+        turn = 1.0 if high >= 0 else -1.0
+        number += _add_outermost(points, height, count, chosen, (turn * mx, turn * my, turn * mz), least)
+    return number
+
+
+@inlined
+def _add_outermost(points, height, count, chosen, axis, least):
+    """Write to chosen[3] the point farthest outside of the triangle of the first three; return how many, 0 or 1.
+
+    The three are anticlockwise about the axis. Twice the area that it makes with a side is more than `least`. Of the sides those from the
+    second to the third and on to the first are looked at: what lies beyond the other one is chosen already.
+    """
+    (mx, my, mz), outermost, best = axis, -1, -inf
+    for begin, end in ((chosen[1], chosen[2]), (chosen[2], chosen[0])):
         ex, ey = points[end, 0] - points[begin, 0], points[end, 1] - points[begin, 1]
         ez = points[end, 2] - points[begin, 2]
         side = sqrt(ex * ex + ey * ey + ez * ez)
         for k in range(count):
             x, y, z = points[k, 0] - points[begin, 0], points[k, 1] - points[begin, 1], points[k, 2] - points[begin, 2]
-            out = -turn * (mx * (ey * z - ez * y) + my * (ez * x - ex * z) + mz * (ex * y - ey * x))
-            place = out / side - GAP_WEIGHT * (height[k] - height[deepest])
+            out = -(mx * (ey * z - ez * y) + my * (ez * x - ex * z) + mz * (ex * y - ey * x))
+            place = out / side - GAP_WEIGHT * (height[k] - height[chosen[0]])
             if out > least and place > best:
                 outermost, best = k, place
-    if outermost >= 0:
-        chosen[3] = outermost
-        number = np.int64(4)
-    return number
+    if outermost < 0:
+        return np.int64(0)
+    chosen[3] = outermost
+    return np.int64(1)
 
 
 class Plane(NamedTuple):

@@ -31,8 +31,8 @@ may give energy, a third balance takes their place: that of the energy seen from
 with p the momentum and m the mass of all, and a the steady accelerations.
 
 The rise is that of any balance over its least value so far. Between the ends of steps of sub-stepped islands frames have no state of the
-solver: paths are polynomials there, and a body that rebounds is slow on the way. At such frames the least value is the greatest of all
-that are a step away at most, and what is compared with it the least of these.
+solver: velocities go from those at one end to those at the other, so that a body that rebounds is slow on the way. At such frames the least
+value is the greatest of all frames that are a step away, or next to it, and what is compared with it the least of these.
 
 The rise is compared with the energy that moves,
 
@@ -126,8 +126,10 @@ def _rise_of(record: RunRecord, balance: np.ndarray) -> np.ndarray:
         steps = record.world.accuracy.step / np.diff(record.frames.times).min()
         reach = math.ceil(steps - SAME_TIME)
         padded = np.pad(balance, reach, mode="edge")
-        around = np.stack([padded[k : k + len(balance)] for k in range(2 * reach + 1)])
-        low[inside], high[inside] = around.max(axis=0)[inside], around.min(axis=0)[inside]
+        for k in range(2 * reach + 1):
+            beside = padded[k : k + len(balance)]
+            np.maximum(low, beside, out=low, where=inside)
+            np.minimum(high, beside, out=high, where=inside)
     return np.maximum(high - np.minimum.accumulate(low), 0.0)
 
 

@@ -299,8 +299,7 @@ class ContactStepper:
         motion = most_motion(self.bodies, self.table.pairs, ahead)
         # Fast bodies are looked at more often, with enough sub-steps between the looks. So are those that come from farther than
         # contacts are looked for: a big ball met small bricks only when it was a third inside of them (issue 28).
-        pieces = self._pieces(ahead)
-        needed = math.ceil(max(pieces, most_approach(self.bodies, self.table.pairs, ahead, self._fall(ahead))))
+        needed = math.ceil(max(self._pieces(motion, ahead), most_approach(self.bodies, self.table.pairs, ahead, self._fall(ahead))))
         if needed > MOST_LOOKS:
             self._report_fastest(run, members, needed, ahead)
             needed = MOST_LOOKS
@@ -318,10 +317,9 @@ class ContactStepper:
         message = TOO_FAST_REMEDY.format(looks=looks, ahead=ahead, most=MOST_LOOKS)
         run.log.report(run.state.time, "too fast for sub-steps", (self.world.names[i],), message)
 
-    def _pieces(self, ahead: float) -> float:
-        """Into how many pieces `ahead` s must be cut, so that pairs that have contacts are looked at often enough."""
-        bodies, pairs = self.bodies, self.table.pairs
-        return max(most_motion(bodies, pairs, ahead) / COARSEST, most_turn(bodies, pairs, self._cornered, ahead) / TURNED)
+    def _pieces(self, motion: float, ahead: float) -> float:
+        """Pieces into which `ahead` s is cut, so that pairs that have contacts are looked at often enough; motion: see `most_motion`."""
+        return max(motion / COARSEST, most_turn(self.bodies, self.table.pairs, self._cornered, ahead) / TURNED)
 
     def _fall(self, ahead: float) -> float:
         """Half of what steady forces may add to a speed in `ahead` s, m/s."""
@@ -504,8 +502,9 @@ class ContactStepper:
             while left:
                 if not looked:
                     look_again()
+                ahead = self.ahead * left / length
                 # Speeds may be no numbers by now: the end of the step finds them.
-                pieces = max(math.ceil(min(left, self._pieces(self.ahead * left / length))), 1)
+                pieces = max(math.ceil(min(left, self._pieces(most_motion(self.bodies, self.table.pairs, ahead), ahead))), 1)
                 some = min(max(left // pieces, LEAST_SUB_STEPS_BETWEEN), left)
                 yield some
                 left, looked = left - some, False
