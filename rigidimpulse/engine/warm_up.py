@@ -22,6 +22,9 @@ from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
 from typing import IO, Any
 
+import numpy as np
+
+from rigidimpulse.collision.manifold.shrunk_shapes import convex_polyhedra, several_polyhedra
 from rigidimpulse.core.claim import claim
 from rigidimpulse.core.kernel_cache import is_kept, note_beside, variables_to_share_kernels
 from rigidimpulse.core.kernels import Kernel, is_cached
@@ -30,23 +33,26 @@ from rigidimpulse.model.world import World
 logger = logging.getLogger("rigidimpulse")
 LOOP = "order of events"
 CONTACTS, EVENTS, SUBSTEPPED, JOINTS = "contacts", "impacts of balls", "sub-stepped islands", "joints"
-STEPPED_JOINTS = "joints in sub-stepped islands"
+STEPPED_JOINTS, ANY_SHAPES = "joints in sub-stepped islands", "any shapes in sub-stepped islands"
+UNDER_FORCES = "contacts under varying forces"
 LAST = {
     CONTACTS: ("engine.touching", "find_touching"),
     EVENTS: ("engine.spheres.flight", "fly"),
     SUBSTEPPED: ("dynamics.solvers.tgs_soft.solver", "advance"),
     JOINTS: ("dynamics.constraints.joint_sub_step", "close_at_end"),
     STEPPED_JOINTS: ("dynamics.solvers.time_stepping.solver", "step_island"),
+    ANY_SHAPES: ("collision.contact_update", "store_contacts"),
+    UNDER_FORCES: ("dynamics.constraints.contact", "hold_contacts"),
 }
 """The kernel of each kind that is compiled last."""
 _BACKGROUND: list[subprocess.Popen] = []
 """Processes that nobody waits for."""
 PARTS_MODULE = "rigidimpulse.engine.warm_up_parts"
-SECONDS = {CONTACTS: 60, EVENTS: 20, SUBSTEPPED: 35, JOINTS: 30, STEPPED_JOINTS: 40}
+SECONDS = {CONTACTS: 60, EVENTS: 20, SUBSTEPPED: 35, JOINTS: 40, STEPPED_JOINTS: 40, ANY_SHAPES: 30, UNDER_FORCES: 15}
 """s that compiling each kind takes, about, on two threads of one core."""
 LONGEST_WAIT, LOOK_AGAIN = 10.0, 0.2
 """How many times as long as compiling takes a process waits for another one that compiles; s, how often it looks whether that has ended."""
-NUMBER_OF_PARTS = {CONTACTS: 2, EVENTS: 1, SUBSTEPPED: 2, JOINTS: 3, STEPPED_JOINTS: 1}
+NUMBER_OF_PARTS = {CONTACTS: 2, EVENTS: 1, SUBSTEPPED: 2, JOINTS: 4, STEPPED_JOINTS: 1, ANY_SHAPES: 1, UNDER_FORCES: 1}
 
 
 def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> None:
@@ -90,9 +96,17 @@ def kernels_to_compile(world: World, with_events: bool, with_substepped: bool, i
     joints = bool(world.joints_of_scene)
     needed = {
         CONTACTS: world.can_collide, EVENTS: with_events, SUBSTEPPED: with_substepped, JOINTS: joints,
-        STEPPED_JOINTS: with_substepped and joints,
+        STEPPED_JOINTS: with_substepped and joints, ANY_SHAPES: with_substepped and _has_other_shapes(world),
+        UNDER_FORCES: world.can_collide and bool(world.force_tables),
     }  # fmt: skip
     return [kind for kind in LAST if needed[kind] and not is_ready(_last_kernel(kind))]
+
+
+def _has_other_shapes(world: World) -> bool:
+    """Whether a movable body is neither a ball nor made of convex polyhedra, for which sub-stepped islands have kernels of their own."""
+    geometry = world.geometry
+    polyhedra = convex_polyhedra(geometry, world.convex_depths) | several_polyhedra(geometry)
+    return bool(np.any(world.dynamic & ~world.ball & ~polyhedra[world.shape_of_body]))
 
 
 def _last_kernel(kind: str) -> Any:

@@ -21,6 +21,7 @@ from typing import IO
 from rigidimpulse.core.kernel_cache import note_beside, source_digest
 from rigidimpulse.core.kernels import INTERPRETED
 from rigidimpulse.engine.warm_up import (
+    ANY_SHAPES,
     CONTACTS,
     EVENTS,
     JOINTS,
@@ -29,6 +30,7 @@ from rigidimpulse.engine.warm_up import (
     SECONDS,
     STEPPED_JOINTS,
     SUBSTEPPED,
+    UNDER_FORCES,
     start_process,
 )
 
@@ -69,7 +71,7 @@ class Failed:
     reason: str
 
 
-ORDER = (CONTACTS, SUBSTEPPED, JOINTS, STEPPED_JOINTS, EVENTS)
+ORDER = (CONTACTS, SUBSTEPPED, JOINTS, STEPPED_JOINTS, ANY_SHAPES, UNDER_FORCES, EVENTS)
 ALL_PARTS = (
     *(KernelPart(kind, number) for kind in ORDER for number in range(NUMBER_OF_PARTS[kind])),
     KernelPart(LOOP),

@@ -11,39 +11,44 @@ import time
 
 import numpy as np
 
+from rigidimpulse.collision.containment import points_inside
+from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.collision.time_of_impact import bisection
 from rigidimpulse.collision.time_of_impact.result import PairsToSweep
 from rigidimpulse.core.union_find import roots
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
-from rigidimpulse.dynamics.constraints.joint_flight import fly_jointed
+from rigidimpulse.dynamics.constraints.joint_flight import fly
 from rigidimpulse.dynamics.constraints.joint_impact import fill_rates, impact_rows
 from rigidimpulse.dynamics.constraints.joint_limits import next_switch
 from rigidimpulse.dynamics.constraints.joint_sub_step import close_at_end, fill_closing_rows, start_joint_rows, stop_rows
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, count_joint_rows
 from rigidimpulse.dynamics.constraints.position_correction import Sunk, correct_positions, needs_correction
-from rigidimpulse.dynamics.constraints.rolling_friction import rolling_of
+from rigidimpulse.dynamics.constraints.rolling_friction import NO_ROLLING, rolling_of
 from rigidimpulse.dynamics.constraints.rows import change_velocities, changes_of, contact_rows, make_rows, response_to, row_velocities
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick
 from rigidimpulse.engine.begin import make_plan, make_run
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.exact.compiled_loop import CompiledLoop
+from rigidimpulse.engine.exact.energy_limit import limit_energy, note_end_energy
 from rigidimpulse.engine.exact.impacts import respond
+from rigidimpulse.engine.exact.joint_flights import WHOLE
 from rigidimpulse.engine.exact.joints import JointState
-from rigidimpulse.engine.exact.step_size import Forces, StepLimits, Turning, hold_turning, turns
+from rigidimpulse.engine.exact.step_size import Forces, StepLimits, Turning, estimate_error, hold_turning, turns
 from rigidimpulse.engine.exact.trajectories import set_impact_margins
 from rigidimpulse.engine.islands import touching_islands
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.regime import TALL, island_roots, refusals, support_levels
 from rigidimpulse.engine.run import Run, start_trajectories
-from rigidimpulse.engine.sleeping import advance_sleep_timers, stands_still
+from rigidimpulse.engine.sleeping import advance_sleep_timers, stands_still, wake_by_contact
 from rigidimpulse.engine.spheres.run import EventRun
 from rigidimpulse.engine.step import step
 from rigidimpulse.engine.substepped.contact_forces import COARSE, ContactStepper
 from rigidimpulse.engine.substepped.jointed import JointedStepper
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.warm_up import (
+    ANY_SHAPES,
     CONTACTS,
     EVENTS,
     JOINTS,
@@ -51,9 +56,10 @@ from rigidimpulse.engine.warm_up import (
     LOOP,
     STEPPED_JOINTS,
     SUBSTEPPED,
+    UNDER_FORCES,
     claim_loop,
 )
-from rigidimpulse.model.contact_memory import grown, make_memory
+from rigidimpulse.model.contact_memory import grown, keep_wrenches, make_memory
 from rigidimpulse.model.contacts import Contacts, Touching
 from rigidimpulse.model.island import empty_contacts
 from rigidimpulse.motion.evaluate import bring_all, bring_gyroscopic, refresh_pose
@@ -74,11 +80,12 @@ def _run_of(scene: Scene) -> Run:
     return make_run(world, make_plan(world), Recorder(np.array([0.0, 1.0]), 2), EventLog())
 
 
-def _box_on_floor(jointed: bool) -> Run:
-    """A run of a scene that has a contact from the start, and a joint if it is to."""
+def _on_floor(kind: str) -> Run:
+    """A run of a scene that has a contact from the start, and what kernels of a kind are for."""
     scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static")])
-    scene.add(Body("body", Shape.box((1, 1, 1)), position=(0, 0, 0.5), velocity=(0, 0, -1)))
-    if jointed:
+    shape = Shape.capsule(0.5, 1.0) if kind == ANY_SHAPES else Shape.box((1, 1, 1))
+    scene.add(Body("body", shape, position=(0, 0, 0.5), velocity=(0, 0, -1)))
+    if kind in (JOINTS, STEPPED_JOINTS):
         scene.add(HingeJoint("body", None, (0, 0, 1), (1, 0, 0)))
     return _run_of(scene)
 
@@ -97,23 +104,22 @@ def _respond_and_detect(run: Run) -> None:
     """Impulses first: by then the other process has rows and what moves bodies in the cache, which these need too."""
     state, world, now, one, contacts = run.state, run.world, run.state.now, np.ones(1), _contact()
     members = np.array([1])
-    now.inv_inertia[1] = np.eye(3)
+    problem, turning = _held(run, contacts)
     needs_correction(contacts, np.ones(1, bool), np.ones(1, bool), one)
     which = np.zeros(1, bool)
     correct_positions(now, contacts, Sunk(which, which, np.zeros(1)), members, run.column)
     refresh_pose(members, now, state.rotation, state.trajectory.inertia)
     bring_gyroscopic(members, now, state.rotation, state.trajectory.inertia, run.angular_acceleration)
     _record(run, contacts, members)
-    motion = contact_motion(
-        world.geometry, world.shape_of_body, state.rotation, now, contacts, np.zeros(1, np.int64), np.zeros((1, 2), np.int64)
-    )
     solve_newton(make_rows.py_func(0), 1, 1.0)
-    problem = ContactProblem(now, contacts, members, run.column, motion.turning, run.acceleration, run.angular_acceleration)
-    turning = Turning(motion, Touching(np.zeros(1, np.int64), np.zeros((1, 2), np.int64)), one)
     limits = StepLimits(1.0, 1.0, state.sub_step, state.under_contact)
     rolling = rolling_of(world.rolling, world.material_of_body, now, contacts)
-    turns(motion, 1.0)
-    hold_turning(None, None, problem, turning, run.error_estimate, limits, Forces(np.zeros((1, 3)), run.wrench), rolling)
+    turns(turning.motion, 1.0)
+    held = hold_turning(None, None, problem, turning, run.error_estimate, limits, Forces(np.zeros((1, 3)), run.wrench), rolling)
+    state.remember(1)
+    keep_wrenches(state.memory, world.num_bodies, 0.0, contacts, held.force, held.slides)
+    note_end_energy(state.limiter, now, world.constants, members)
+    limit_energy(state.limiter, now, world.constants, state.trajectory, members, 0.0, which, np.empty(1))
     stands_still(problem, world.constants, contacts, run.wrench, 1.0)
     start_trajectories(run)
     pair_events = PairEvents(run, 1.0 / 60.0)
@@ -124,6 +130,26 @@ def _respond_and_detect(run: Run) -> None:
     pair_events.bodies_at(0.0)
     pair_events.count_contacts(0.0)
     # What is left is what the steps of a body that falls and rests call.
+    _take_steps(run)
+    points_inside(world.geometry, 1, np.zeros((1, 3)))
+
+
+def _held(run: Run, contacts: Contacts) -> tuple[ContactProblem, Turning]:
+    """The contact as a lasting one."""
+    state, world, members = run.state, run.world, np.array([1])
+    state.now.inv_inertia[1] = np.eye(3)
+    touching = Touching(np.zeros(1, np.int64), np.zeros((1, 2), np.int64))
+    motion = contact_motion(
+        world.geometry, world.shape_of_body, state.rotation, state.now, contacts, touching.kind, touching.feature
+    )
+    problem = ContactProblem(
+        state.now, contacts, members, run.column, motion.turning, run.acceleration, run.angular_acceleration
+    )
+    return problem, Turning(motion, touching, np.ones(1))
+
+
+def _take_steps(run: Run) -> None:
+    """Some steps of the loop in Python."""
     run.recorder.start(run.state.trajectory)
     for number in range(1, 4):
         step(run, number * STEP)
@@ -179,7 +205,10 @@ def _find_substepped_contacts(run: Run) -> None:
     stepper = ContactStepper(world, world.dynamic, COARSE)
     for _ in range(2):  # The second time there is a cover.
         stepper.set_up(run, np.array([1]), np.array([0]), STEP)
+    stepper.move_apart(run, np.array([1]), 0.0)
     stepper.near(run, member, ~member, STEP)
+    stepper.table.free[:, 0] = stepper.table.free[:, 1]
+    stepper.table.pack()
     # Columns of one row only would be another type.
     a, b = np.array([[0, 1], [0, 1]]).T
     root = island_roots(world.num_bodies, a, b, member)
@@ -198,6 +227,8 @@ def _step_substepped(run: Run) -> None:
     end_trajectories(state.trajectory, members, 0.0, steady, now, state.rotation, run.acceleration, run.angular_acceleration)
     depart(state.trajectory, members, 0.0, STEP, now, out.position, out.orientation, out.velocity)
     let_fly(state.trajectory, members, steady)
+    pair, member = np.array([0]), np.array([False, True])
+    wake_by_contact(pair, pair, member, member, now, run.world.mass, run.world.steady_strength, stepper.inner)
     mark_slow(now, stepper.inner, 1.0, 1.0, np.array([False, True]))
     most_stray(now, members, stepper.pressed, stepper.reach, stepper.skin, 0.5)
     advance_sleep_timers(
@@ -238,8 +269,17 @@ def _fly_on_joints(run: Run) -> None:
     """Flights of bodies that joints hold, and the switches of limits on the way."""
     island, joints = _jointed_box(run), run.joints
     assert isinstance(joints, JointState)
-    fly_jointed(island, joints.flights.flight, run.acceleration, STEP)
+    fly(island, joints.flights.flight, run.acceleration, STEP, WHOLE)
     next_switch(joints.table, island.which, joints.memory, (STEP, STEP), 1.0)
+
+
+def _touch_with_joints(run: Run) -> None:
+    """Contacts of bodies with joints, and what the steps of such bodies call besides: by then others have compiled their parts."""
+    problem, turning = _held(run, _contact())
+    estimate_error(problem, turning, run.error_estimate, Forces(np.zeros((1, 3)), run.wrench), STEP, STEP)
+    start_trajectories(run)
+    run.pose_matrix(1, 0.0)
+    _take_steps(run)
 
 
 def _step_jointed(run: Run) -> None:
@@ -251,7 +291,23 @@ def _step_jointed(run: Run) -> None:
     joints.step(run, 0.0, STEP)
 
 
-def _fly(_run: Run) -> None:
+def _find_contacts_of_any_shapes(run: Run) -> None:
+    """Contacts of a capsule in a sub-stepped island; what of a body with an inset surface is inside others."""
+    stepper, members = ContactStepper(run.world, run.world.dynamic, COARSE), np.array([1])
+    run.state.now.inv_inertia[1] = np.eye(3)
+    stepper.set_up(run, members, np.array([0]), STEP)
+    posed = Posed(0, np.zeros(3), np.eye(3)), Posed(1, np.zeros(3), np.eye(3))
+    pair_gap(run.world.geometry, *posed, 1.0, np.zeros(7))
+
+
+def _hold_under_forces(run: Run) -> None:
+    """Contact forces beside forces that vary: then the loop in Python calls their kernel."""
+    problem, turning = _held(run, _contact())
+    limits, forces = StepLimits(1.0, 1.0, run.state.sub_step, run.state.under_contact), Forces(np.zeros((1, 3)), run.wrench)
+    hold_turning(None, lambda h: h, problem, turning, run.error_estimate, limits, forces, NO_ROLLING)
+
+
+def _fly_balls(_run: Run) -> None:
     """The event kernel; it knows balls only."""
     scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static"), Body("ball", Shape.sphere(1.0), position=(0, 0, 9))])
     run = _run_of(scene)
@@ -272,10 +328,12 @@ def _go_from_event_to_event(run: Run) -> None:
 
 PARTS = {
     CONTACTS: (_respond_and_detect, _move_and_sweep),
-    EVENTS: (_fly,),
+    EVENTS: (_fly_balls,),
     SUBSTEPPED: (_find_substepped_contacts, _step_substepped),
-    JOINTS: (_start_joints, _close_and_stop_joints, _fly_on_joints),
+    JOINTS: (_start_joints, _close_and_stop_joints, _fly_on_joints, _touch_with_joints),
     STEPPED_JOINTS: (_step_jointed,),
+    ANY_SHAPES: (_find_contacts_of_any_shapes,),
+    UNDER_FORCES: (_hold_under_forces,),
     LOOP: (_go_from_event_to_event,),
 }
 """What is compiled at once, by kind; each gets a run."""
@@ -283,7 +341,7 @@ PARTS = {
 
 def compile_part(kind: str, part: int) -> None:
     """Compile one part."""
-    PARTS[kind][part](_box_on_floor(kind in (JOINTS, STEPPED_JOINTS)))
+    PARTS[kind][part](_on_floor(kind))
 
 
 def compile_alone(kind: str, part: int) -> None:

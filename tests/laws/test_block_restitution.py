@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rigidimpulse.dynamics.constraints.joint_impact import NO_JOINTS
 from rigidimpulse.dynamics.impact.restitution import LAWS, ImpactRule
 from rigidimpulse.dynamics.impact.sequence import respond_simultaneous
 from rigidimpulse.model.contacts import Contacts
@@ -38,7 +39,8 @@ def respond(bodies: BodyState, contacts: Contacts, law: str) -> np.ndarray:
     log, m = np.zeros((100, 7)), len(contacts.gap)
     scale = float(np.abs(bodies.velocity).max() + np.abs(bodies.angular_velocity).max())
     column = np.zeros(len(bodies.inv_mass), np.int64)
-    count, _, _ = respond_simultaneous(bodies, contacts, ImpactRule(LAWS[law], np.zeros(m), 1e-12 * scale, scale), True, column, None, log)
+    rule = ImpactRule(LAWS[law], np.zeros(m), 1e-12 * scale, scale)
+    count, _, _ = respond_simultaneous(bodies, contacts, rule, True, column, NO_JOINTS, log)
     return log[:count]
 
 

@@ -341,7 +341,7 @@ def test_depths_are_lower_bounds(mine: str, other: str) -> None:
         if apart.gap > 0.0:
             assert depth <= 1e-6
             continue
-        assert not surely_apart(solids[1], probes[0], there)[0] or apart.gap > -1e-9
+        assert not surely_apart(probes[0].corners[None], solids[1].bounds[None], there)[0] or apart.gap > -1e-9
         if np.all(np.isfinite(apart.normal)) and "cylinder" not in (mine, other):
             # Closed forms: of balls, and of half spaces.
             assert depth <= -apart.gap * (1.0 + 1e-9) + 1e-12

@@ -91,6 +91,19 @@ def make_flight(inv_mass: np.ndarray, size: float, num_joints: int, num_rows: in
 
 
 @jit_making_arrays
+def fly(island, flight, steady, span, pieces):
+    """`fly_past` with pieces (allowed, plan), or `fly_jointed` where the plan is 0: returns what it returns, and 0 where that is less.
+
+    Python calls both as one kernel: the steps of both are the same, and take 20 s to compile.
+    """
+    allowed, plan = pieces
+    if plan == 0.0:
+        return fly_jointed(island, flight, steady, span)
+    flown, plan = fly_past(island, flight, steady, span, allowed, plan)
+    return flown, plan, 0.0
+
+
+@jit_making_arrays
 def fly_jointed(island, flight, steady, h):
     """Fly the members of a `JointedIsland` for h s under steady accelerations (n, 3); the `JointedFlight` is written.
 

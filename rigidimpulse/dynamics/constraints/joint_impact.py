@@ -12,6 +12,7 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.joint import is_linear, joint_rows, relative_point_velocity
 from rigidimpulse.dynamics.constraints.joint_limits import is_reached, limit_side
+from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland
 from rigidimpulse.dynamics.constraints.rows import BOUNDED, Rows, change_velocities, make_rows
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 
@@ -20,13 +21,17 @@ SOLVE_TOLERANCE = TOLERANCES.joint.impact_residual
 
 
 class JointBlock(NamedTuple):
-    """Rows of the joints of an island at an impact."""
+    """Rows of the joints of an island at an impact: of none of them, and no members, where it has no joints."""
 
     members: np.ndarray  # (n,) movable bodies of the island
     rows: Rows
     joint: np.ndarray  # (s,) joint of each row
     direction: np.ndarray  # (s, 3) of the force on b; zeros for rows that turn
     moment: np.ndarray  # (j, 3) N s on b by joint, added to
+
+
+NO_JOINTS = JointBlock(np.zeros(0, np.int64), make_rows.py_func(0), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
+"""Of an island without joints. Another type, None, would have all of an impact compiled twice."""
 
 
 @jit_making_arrays
@@ -73,18 +78,14 @@ def fill_rates(island, rows):
     return fastest
 
 
-@jit_making_arrays
-def stop_at_limits(island, moment):
+def stop_at_limits(island: JointedIsland, moment: np.ndarray) -> None:
     """Impacts without rebound on the hard limits that are reached; moment (j, 3) N s on b by joint, added to."""
     block = impact_rows(island, moment)
-    rows = block.rows
-    if fill_rates(island, rows) > 0.0:
-        fastest = 0.0
-        for i in range(rows.bias.shape[0]):
-            fastest = max(fastest, abs(rows.bias[i]))
-        solve_newton(rows, island.members.shape[0], SOLVE_TOLERANCE * fastest)
-        change_velocities(island.bodies, island.members, rows)
-        add_moments(block, rows.impulse)
+    if fill_rates(island, block.rows) > 0.0:
+        fastest = float(np.abs(block.rows.bias).max())
+        solve_newton(block.rows, len(island.members), SOLVE_TOLERANCE * fastest)
+        change_velocities(island.bodies, island.members, block.rows)
+        add_moments(block, block.rows.impulse)
 
 
 @jit

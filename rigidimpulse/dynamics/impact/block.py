@@ -200,13 +200,10 @@ def _movable(bodies, contacts, number):
 @jit_making_arrays
 def _make_block(bodies, contacts, members, rebound, rule, number, joints):
     """The `Block` of contacts: velocities now, and those that the rebound asks for; arguments as in `solve_block`."""
-    extra = np.int64(0)
-    if joints is not None:
-        extra = joints.joint.shape[0]
+    extra = joints.joint.shape[0]
     of_contacts = contact_rows(bodies, contacts, members, number, extra)
     rows, first_row = of_contacts.rows, of_contacts.first_row
-    if joints is not None:
-        copy_rows(joints.rows, rows, rows.bias.shape[0] - extra)
+    copy_rows(joints.rows, rows, rows.bias.shape[0] - extra)
     u, target, e = np.zeros(rows.bias.shape[0]), np.zeros(rows.bias.shape[0]), np.zeros(first_row.shape[0])
     row_velocities(bodies, contacts, first_row, of_contacts.frames, u)
     for c in range(e.shape[0]):
@@ -232,7 +229,7 @@ def _any_friction(contacts):
 def solve_block(bodies, contacts, subset, rebound, rule, number, joints, log):
     """Resolve the contacts of subset (k,) together and apply the impulses.
 
-    rebound: 1, or 0 for an inelastic one; rule: the `ImpactRule` of all contacts; number (n_world,): working memory; joints: None, or the
+    rebound: 1, or 0 for an inelastic one; rule: the `ImpactRule` of all contacts; number (n_world,): working memory; joints: the
     `JointBlock` of the island; log (k, 7): rows not yet written. Returns how many rows of the log were written.
     """
     if subset.shape[0] < contacts.gap.shape[0]:
@@ -240,10 +237,7 @@ def solve_block(bodies, contacts, subset, rebound, rule, number, joints, log):
         for s in range(subset.shape[0]):
             rest_speed[s] = rule.rest_speed[subset[s]]
         rule = ImpactRule(rule.law, rest_speed, rule.tolerance, rule.scale)
-    if joints is None:
-        members = _movable(bodies, contacts, number)
-    else:
-        members = joints.members
+    members = joints.members if joints.members.shape[0] else _movable(bodies, contacts, number)
     block = _make_block(bodies, contacts, members, rebound, rule, number, joints)
     if rule.law == NEWTON or (rule.law == AUTO and not _any_friction(contacts)):
         p = _newton(block)
@@ -252,8 +246,7 @@ def solve_block(bodies, contacts, subset, rebound, rule, number, joints, log):
     rows = block.of_contacts.rows
     copy_vector(p, rows.impulse)
     change_velocities(bodies, members, rows)
-    if joints is not None:
-        add_moments(joints, rows.impulse)
+    add_moments(joints, rows.impulse)
     count = log_block(bodies, block, log)
     for k in range(count):
         log[k, 0] = subset[np.int64(log[k, 0])]

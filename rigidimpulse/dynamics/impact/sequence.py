@@ -70,23 +70,23 @@ def respond_sequential(bodies, contacts, rule, together, number, joints, log):
     A full log ends the call early, without the inelastic finish: read it and call again. It must have more rows than there are contacts.
 
     rule: the `ImpactRule` of the m contacts; together: whether bodies press on each other, so that all contacts are one block; number
-    (n,): working memory; joints: None, or the `JointBlock` of the island, whose rows take part in every impulse; log (k, 7): see
+    (n,): working memory; joints: the `JointBlock` of the island, whose rows take part in every impulse; log (k, 7): see
     `point.log_impact`.
     """
     m, count, impulses = contacts.gap.shape[0], np.int64(0), np.int64(0)
     cap, round_cap = IMPULSES_PER_CONTACT * m, IMPULSES_PER_ROUND * m
     rule, one_block = ImpactRule(rule.law, rule.rest_speed.copy(), rule.tolerance, rule.scale), together and m > 1
+    jointed = joints.joint.shape[0] > 0
     while impulses < cap and count + m < log.shape[0]:
         if impulses >= round_cap:
             _let_collapse(contacts, log[:count], rule.rest_speed)
         c = np.int64(-1)
-        if joints is None:
-            if not one_block:
-                count, made, c = resolve_singles(bodies, contacts, rule, 1.0, round_cap, log, count)
-                impulses += made
-                if made == round_cap:
-                    continue
-        if joints is not None or one_block:
+        if not (jointed or one_block):
+            count, made, c = resolve_singles(bodies, contacts, rule, 1.0, round_cap, log, count)
+            impulses += made
+            if made == round_cap:
+                continue
+        else:
             c = _approaching(bodies, contacts, rule.tolerance, 1.0, rule.rest_speed)
         if c < 0:
             break
@@ -130,9 +130,8 @@ def _let_collapse(contacts, log, rest_speed):
 @jit_making_arrays
 def _finish(bodies, contacts, rule, number, joints, log, count):
     """One inelastic impulse of all contacts; returns the new count of log."""
-    if joints is None:
-        if contacts.gap.shape[0] == 1:
-            return resolve_singles(bodies, contacts, rule, 0.0, np.int64(1), log, count)[0]
+    if joints.joint.shape[0] == 0 and contacts.gap.shape[0] == 1:
+        return resolve_singles(bodies, contacts, rule, 0.0, np.int64(1), log, count)[0]
     return count + solve_block(bodies, contacts, np.arange(contacts.gap.shape[0]), 0.0, rule, number, joints, log[count:])
 
 
@@ -142,10 +141,9 @@ def respond_simultaneous(bodies, contacts, rule, together, number, joints, log):
     count, impulses = np.int64(0), np.int64(0)
     if _approaching(bodies, contacts, rule.tolerance, 0.0, rule.rest_speed) < 0:
         return count, impulses, False
-    if joints is None:
-        if contacts.gap.shape[0] == 1:
-            # The only contact, by the law of a single one; inelastic where it is too slow to rebound.
-            return respond_sequential(bodies, contacts, rule, together, number, joints, log)
+    if joints.joint.shape[0] == 0 and contacts.gap.shape[0] == 1:
+        # The only contact, by the law of a single one; inelastic where it is too slow to rebound.
+        return respond_sequential(bodies, contacts, rule, together, number, joints, log)
     count = solve_block(bodies, contacts, np.arange(contacts.gap.shape[0]), 1.0, rule, number, joints, log)
     impulses += 1
     if _approaching(bodies, contacts, rule.tolerance, 0.0, rule.rest_speed) >= 0:

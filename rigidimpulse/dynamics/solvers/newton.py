@@ -27,7 +27,7 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import copy_matrix, copy_vector
 from rigidimpulse.dynamics.constraints.rows import BOUNDED, DISC, DISC_SECOND, FREE, SEGMENT, SLIDE, multiply, multiply_transposed
-from rigidimpulse.dynamics.solvers.sparse_lu import factor, plan_elimination, solve_factored
+from rigidimpulse.dynamics.solvers.sparse_lu import Elimination, factor, plan_elimination, solve_factored
 
 MAX_OUTER = 60
 MAX_INNER = 60
@@ -224,22 +224,43 @@ def _speed(rows, y, line):
     return largest
 
 
+class Factored(NamedTuple):
+    """F' as it was factored last: slopes are often the same again, wherever no row changes between its bounds and no contact slips."""
+
+    elimination: Elimination
+    blocks: np.ndarray  # (num_blocks, 6, 6) factors
+    pivots: np.ndarray  # (n, 6)
+    slope: np.ndarray  # (r, 3) of which they are; no numbers before the first time
+
+
+@jit
+def _factor_again(rows, factored, slope):
+    """See that F' with these slopes (r, 3) is factored."""
+    known = factored.slope
+    same = True
+    for i in range(slope.shape[0]):
+        same = same and slope[i, 0] == known[i, 0] and slope[i, 1] == known[i, 1] and slope[i, 2] == known[i, 2]
+    if same:
+        return
+    _assemble(rows, slope, factored.elimination.slot, factored.blocks, factored.pivots.shape[0])
+    factor(factored.elimination, factored.blocks, factored.pivots)
+    copy_matrix(slope, known)
+
+
 @jit_making_arrays
-def _newton(rows, elimination, law, p, target):
+def _newton(rows, factored, law, p, target):
     """Find p with F = 0. Returns whether it converged (or cannot be improved further)."""
-    n, count = elimination.order.shape[0], p.shape[0]
+    n, count = factored.pivots.shape[0], p.shape[0]
     change, trial = np.zeros((n, 6)), np.empty((n, 6))
     residual, step = np.empty((n, 6)), np.empty((n, 6))
     u, line, slope = np.empty(count), np.empty(count), np.empty((count, 3))
-    blocks, pivots = np.empty((elimination.num_blocks, 6, 6)), np.empty((n, 6), np.int64)
     size = _evaluate(rows, law, change, u, p, slope, residual)
     for _ in range(MAX_INNER):
         if _speed(rows, residual, line) <= target:
             return True
-        _assemble(rows, slope, elimination.slot, blocks, n)
+        _factor_again(rows, factored, slope)
         copy_matrix(residual, step)
-        factor(elimination, blocks, pivots)
-        solve_factored(elimination, blocks, pivots, step)
+        solve_factored(factored.elimination, factored.blocks, factored.pivots, step)
         # |F| carries the round-off of u divided by k; its step does not.
         is_last = _speed(rows, step, line) <= target
         scale, improved, trial_size = 1.0, False, size
@@ -280,13 +301,26 @@ def rounding_floor(rows, weight, p):
 
 
 @jit_making_arrays
+def prepare(rows, n):
+    """What a solver of these rows of n movable bodies needs, `Factored`: the same for other biases, bounds and impulses."""
+    elimination = plan_elimination(rows.first, rows.second, n)
+    unknown = np.full((rows.bias.shape[0], 3), np.nan)
+    return Factored(elimination, np.empty((elimination.num_blocks, 6, 6)), np.empty((n, 6), np.int64), unknown)
+
+
+@jit_making_arrays
 def solve_newton(rows, n, target):
     """Solve the rows of an island of n movable bodies; `rows.impulse` is start and answer.
 
     target: residual asked for, m/s. Returns the residual of the natural map that was reached.
     """
-    count = rows.bias.shape[0]
-    elimination = plan_elimination(rows.first, rows.second, n)
+    return solve_prepared(rows, prepare(rows, n), target)
+
+
+@jit_making_arrays
+def solve_prepared(rows, factored, target):
+    """The same with what `prepare` made of rows between the same bodies, along the same directions."""
+    n, count = factored.pivots.shape[0], rows.bias.shape[0]
     weight = np.empty(count)
     row_weights(rows, weight)
     y, u, r = np.empty((n, 6)), np.empty(count), np.empty(count)
@@ -301,7 +335,7 @@ def solve_newton(rows, n, target):
             # With frozen radii the problem is convex: the last resort.
             frozen[i] = rows.coefficient[i] * max(q[rows.master[i]], 0.0) if convex else -1.0
             r[i] = weight[i] * (min(k, free_k) if rows.kind[i] == FREE else k)
-        solved = _newton(rows, elimination, RegularisedLaw(u, q, r, frozen), trial, 0.05 * target)
+        solved = _newton(rows, factored, RegularisedLaw(u, q, r, frozen), trial, 0.05 * target)
         # The line search failed: more regularisation, and at last a step with frozen radii.
         if not solved and not convex:
             failures += 1

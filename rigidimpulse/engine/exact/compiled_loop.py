@@ -13,6 +13,7 @@ from rigidimpulse.collision.time_of_impact.bisection import LOOK_AHEAD
 from rigidimpulse.core.kernel_cache import is_kept, note_beside
 from rigidimpulse.core.memory import rows_of
 from rigidimpulse.core.record import Record
+from rigidimpulse.dynamics.constraints.joint_impact import NO_JOINTS
 from rigidimpulse.dynamics.impact.restitution import LAWS
 from rigidimpulse.engine.exact.contact_forces import NOT_SOLVED_REMEDY
 from rigidimpulse.engine.exact.event_loop import (
@@ -123,7 +124,7 @@ class CompiledLoop:
                 settings, world.compiled_shapes, pair_bodies(world), world.margins, world.coefficients, world.rolling, self._elsewhere,
                 run.motion, PairEvents(run, state.time).table, state.memory, state.limiter, run.log.buffers, run.contact_log.buffers,
                 run.recorder.frames, run.recorder.written, self._reports, run.error_estimate, run.detector.sweep_scratch, run.wrench,
-                run.column, state.sub_step, run.substepped.solve_count, run.impact_log, self._cycles, self._calls,
+                run.column, state.sub_step, run.substepped.solve_count, run.impact_log, NO_JOINTS, self._cycles, self._calls,
             )
         )  # fmt: skip
 

@@ -24,6 +24,7 @@ from rigidimpulse.core.cycles import cycles
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
+from rigidimpulse.dynamics.constraints.joint_impact import JointBlock
 from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
 from rigidimpulse.dynamics.constraints.position_correction import Sunk, correct_positions, needs_correction
 from rigidimpulse.dynamics.constraints.rolling_friction import rolling_of
@@ -165,6 +166,7 @@ class Loop(NamedTuple):
     sub_step: np.ndarray  # (n,) s, see `State`
     solve_count: np.ndarray  # (n,) how often a body was dealt with in the step
     impacts: np.ndarray  # (k, 7) working memory, see `point.log_impact`
+    no_joints: JointBlock
     cycles: np.ndarray  # (VERBS,) processor cycles of each verb
     calls: np.ndarray  # (VERBS,)
 
@@ -599,7 +601,7 @@ def _respond(loop, island, touch, members):
     force, constants = np.empty((contacts.gap.shape[0], 3)), loop.bodies.constants
     read_forces(memory, motion.trajectory.start, contacts, touch.touching, force)
     response = Response(SEQUENTIAL, live.collapse or bear_each_other(contacts, constants, force))
-    done = resolve_impacts(now, constants, members, live, response, loop.number, None, loop.impacts)
+    done = resolve_impacts(now, constants, members, live, response, loop.number, loop.no_joints, loop.impacts)
     if has_log_capacity(log, ENERGIES, NO_ROWS, done.count):
         log_impacts(log, island.time, contacts, now.position, done.log, done.count)
     else:

@@ -9,6 +9,7 @@ import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.dynamics.constraints.joint_impact import NO_JOINTS
 from rigidimpulse.dynamics.energy import kinetic_energy
 from rigidimpulse.dynamics.impact.kinematic import respond_kinematic
 from rigidimpulse.dynamics.impact.point import speed_scale
@@ -80,7 +81,7 @@ def respond(run: Run, _pair_events: PairEvents, island: Island) -> None:
     together = live.collapse or bear_each_other(contacts, run.world.constants, forces_of(run, contacts, island.touching))
     done = resolve_impacts(
         state.now, run.world.constants, island.members, live, Response(RESPONSES[accuracy.response], together), run.column,
-        run.joints.impact_block(run, island) if len(island.joints) else None, run.impact_log,
+        run.joints.impact_block(run, island) if len(island.joints) else NO_JOINTS, run.impact_log,
     )  # fmt: skip
     run.log.add_impacts(island.time, contacts, state.now.position, done.log, done.count)
     state.remember(len(contacts.gap))
@@ -127,8 +128,8 @@ def find_live(bodies, contacts, live, speeds, collapses, law):
 def resolve_impacts(bodies, constants, members, live, response, number, joints, log):
     """Apply the impulses of `LiveContacts`; returns the `Impacts`.
 
-    constants: `World.constants`; members (k,): movable bodies of the island; response: a `Response`; number (n,): working memory; joints:
-    None, or the `JointBlock` of the island; log (k, 7): working memory, the returned log where it is long enough.
+    constants: `World.constants`; members (k,): movable bodies of the island; response: a `Response`; number (n,): working memory;
+    joints: the `JointBlock` of the island; log (k, 7): working memory, the returned log where it is long enough.
     """
     before, m = kinetic_energy(bodies, constants, members), live.which.shape[0]
     # Each call gets a log of this size, and is repeated where it fills it.

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from rigidimpulse.dynamics.constraints.joint_flight import fly_jointed, fly_past, length_that_follows, make_flight
+from rigidimpulse.dynamics.constraints.joint_flight import fly, length_that_follows, make_flight
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland
 from rigidimpulse.model.joint_table import Joints
 from rigidimpulse.model.world import World
@@ -34,6 +34,8 @@ OTHERWISE = 0.7
 """Part of the length that is tried next where they do."""
 PAUSE = 16
 """Sub-steps that are not flown after a flight that was given up."""
+WHOLE = 0.0, 0.0
+"""A flight in one piece."""
 
 
 class JointFlights:
@@ -74,7 +76,8 @@ class JointFlights:
         """
         which = jointed.which
         last, plan = float(self._plan[which].min()), float(self._step[which].min())
-        flown, self._step[which] = fly_past(jointed, self.flight, steady, rest - last, self._at_end, last if math.isinf(plan) else plan)
+        pieces = self._at_end, last if math.isinf(plan) else plan
+        flown, self._step[which], _ = fly(jointed, self.flight, steady, rest - last, pieces)
         return flown
 
     def fly(self, jointed: JointedIsland, steady: np.ndarray, rest: float, other: float) -> float:
@@ -91,7 +94,7 @@ class JointFlights:
         h = rest / math.ceil(rest / plan) if plan < rest else rest
         error = 0.0
         while h >= min(least, rest):
-            error, is_open, missed = fly_jointed(jointed, flight, steady, h)
+            error, is_open, missed = fly(jointed, flight, steady, h, WHOLE)
             if not math.isfinite(error):
                 break
             if missed > MISSED:

@@ -580,13 +580,14 @@ def _slide_rate(now: BodyState, a: int, b: int, step: float) -> float:
 
 def reaction_table(joints: RunJoints, times: np.ndarray) -> dict[str, np.ndarray]:
     """Forces on b by joint name, (f, 3) N at the frame times."""
-    table = {}
+    table, nodes = {}, [[] for _ in joints.names]
+    for time, j, force in joints.reactions:
+        nodes[j].append((time, force))
     for j, name in enumerate(joints.names):
-        nodes = [(time, force) for time, k, force in joints.reactions if k == j]
-        if not nodes:
+        if not nodes[j]:
             table[name] = np.zeros((len(times), 3))
             continue
-        at, force = np.array([n[0] for n in nodes]), np.array([n[1] for n in nodes])
+        at, force = (np.array(column) for column in zip(*nodes[j], strict=True))
         last = np.append(np.flatnonzero(np.diff(at) > 0.0), len(at) - 1)
         table[name] = np.column_stack([np.interp(times, at[last], force[last, k]) for k in range(3)])
     return table

@@ -141,11 +141,15 @@ def solid_of(shape: CompiledShape, planes: list[np.ndarray | None], geometry: Ge
     return replace(solid, surface=surface, middles=np.column_stack([middle, farthest]), inside=(geometry, index))
 
 
-def surely_apart(solid: Solid, probe: Probe, posed: Posed) -> np.ndarray:
-    """Which of c probes (c,) are in front of a plane behind which the solid is, and so apart from it."""
-    if not len(probe.corners) or not len(solid.bounds):
+def surely_apart(corners: np.ndarray, bounds: np.ndarray, posed: Posed) -> np.ndarray:
+    """Which of c probes (c,) are in front of a plane behind which the solid is, and so apart from it.
+
+    corners: (c, v, 3) or (1, v, 3) of the probes, bounds: (c, m, 4) or (1, m, 4) of the solids; without any nothing is known.
+    """
+    if not corners.shape[1] or not bounds.shape[1]:
         return np.zeros(len(posed.translation), bool)
-    heights = posed.points(probe.corners) @ solid.bounds[:, :3].T - solid.bounds[:, 3]
+    placed = corners @ posed.rotation.swapaxes(1, 2) + posed.translation[:, None]
+    heights = placed @ bounds[:, :, :3].swapaxes(1, 2) - bounds[:, None, :, 3]
     return heights.min(axis=1).max(axis=1) > 0.0
 
 

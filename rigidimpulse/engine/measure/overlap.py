@@ -22,6 +22,7 @@ machine.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,6 +50,8 @@ FEW: int = 24
 """Bodies up to which all pairs are compared at once."""
 AT_ONCE: int = 2_000_000
 """Numbers that are computed at once."""
+STEP: int = 8
+"""Lengths of arrays that are used together are multiples of this."""
 OF_EDGE: int = 8
 """Numbers for each end of an edge."""
 REMEDY = "use a smaller step, or contact_solver='newton' where islands are sub-stepped"
@@ -102,20 +105,16 @@ def overlap_depths(record: RunRecord) -> Depths:
     size, depth = np.minimum(world.size[a], world.size[b]), np.zeros(len(a))
     if not len(a):
         return Depths(frame, a, b, depth, size)
-    shapes = _Shapes(world)
-    kinds, number = np.unique(np.column_stack([world.shape_of_body[a], world.shape_of_body[b]]), axis=0, return_inverse=True)
-    order = np.argsort(number, kind="stable")
-    # All at once: scenes of many shapes have few candidates of each kind.
-    posed_a, posed_b = _posed(record, frame, a, b), _posed(record, frame, b, a)
-    for (shape_a, shape_b), those in zip(kinds.tolist(), np.split(order, np.flatnonzero(np.diff(number[order])) + 1), strict=True):
-        for all_posed, mine, other in ((posed_a, shape_a, shape_b), (posed_b, shape_b, shape_a)):
-            probe, solid, posed = shapes.probe(mine), shapes.solid(other), all_posed.part(those)
-            near = np.flatnonzero(~surely_apart(solid, probe, posed))
-            those, posed = those[near], posed.part(near)
+    shapes, of, near = _Shapes(world), world.shape_of_body, np.arange(len(a))
+    both = [(of[mine], of[other], _posed(record, frame, mine, other)) for mine, other in ((a, b), (b, a))]
+    for mine, other, posed in both:
+        near = near[~shapes.surely_apart(mine[near], other[near], posed.part(near))]
+    for mine, other, posed in both:
+        for probe, solid, those in shapes.kinds(mine, other, near):
             length = max(AT_ONCE // max(_work(probe, solid), 1), 1)
             for first in range(0, len(those), length):
-                here = np.arange(first, min(first + length, len(those)))
-                depth[those[here]] = np.maximum(depth[those[here]], depth_in(solid, probe, posed.part(here)))
+                here = those[first : first + length]
+                depth[here] = np.maximum(depth[here], depth_in(solid, probe, posed.part(here)))
     return Depths(frame, a, b, depth, size)
 
 
@@ -142,6 +141,56 @@ class _Shapes:
         if shape not in self._solids:
             self._solids[shape] = solid_of(self._world.shapes[shape], self._planes_of(shape), self._world.geometry, shape)
         return self._solids[shape]
+
+    def kinds(self, mine: np.ndarray, other: np.ndarray, which: np.ndarray) -> Iterator[tuple[Probe, Solid, np.ndarray]]:
+        """Probe and solid of each kind of the candidates `which`, and those of that kind; mine, other: (c,) shapes of all."""
+        kinds, number = np.unique(np.column_stack([mine[which], other[which]]), axis=0, return_inverse=True)
+        which, ends = which[np.argsort(number, kind="stable")], np.cumsum(np.bincount(number))
+        for k, (probe, solid) in enumerate(kinds.tolist()):
+            yield self.probe(probe), self.solid(solid), which[ends[k - 1] if k else 0 : ends[k]]
+
+    def surely_apart(self, mine: np.ndarray, other: np.ndarray, posed: Posed) -> np.ndarray:
+        """Which candidates (c,) are apart, see `depth.surely_apart`; mine, other: (c,) shapes.
+
+        Those of alike numbers of corners and planes are asked about together: scenes of many shapes have few of each kind.
+        """
+        out = np.zeros(len(mine), bool)
+        if not len(out):
+            return out
+        corners = _Padded({shape: self.probe(shape).corners for shape in np.unique(mine).tolist()})
+        bounds = _Padded({shape: self.solid(shape).bounds for shape in np.unique(other).tolist()})
+        sizes, number = np.unique(np.column_stack([corners.size[mine], bounds.size[other]]), axis=0, return_inverse=True)
+        for k, (most_corners, most_bounds) in enumerate(sizes.tolist()):
+            those = np.flatnonzero(number == k)
+            length = max(AT_ONCE // max(most_corners * most_bounds, 1), 1)
+            for first in range(0, len(those), length):
+                here = those[first : first + length]
+                out[here] = surely_apart(corners.of(mine[here]), bounds.of(other[here]), posed.part(here))
+        return out
+
+
+class _Padded:
+    """Rows of arrays of several lengths, by their numbers: each is filled up to a multiple of STEP rows with its last one.
+
+    Attributes:
+        size: lengths, by number; 0 of what is not known.
+
+    """
+
+    def __init__(self, arrays: dict[int, np.ndarray]) -> None:
+        self.size = np.zeros(max(arrays) + 1, np.int64)
+        self._rows: dict[int, np.ndarray] = {}
+        self._place = np.zeros(len(self.size), np.int64)
+        for number, array in arrays.items():
+            self.size[number] = STEP * -(-len(array) // STEP)
+        for size in np.unique(self.size[list(arrays)]).tolist():
+            mine = [number for number in arrays if self.size[number] == size]
+            self._place[mine] = np.arange(len(mine))
+            self._rows[size] = np.stack([arrays[number][np.minimum(np.arange(size), len(arrays[number]) - 1)] for number in mine])
+
+    def of(self, numbers: np.ndarray) -> np.ndarray:
+        """The filled up arrays (k, size, ...) of numbers (k,) of one size."""
+        return self._rows[int(self.size[numbers[0]])][self._place[numbers]]
 
 
 def _work(probe: Probe, solid: Solid) -> int:

@@ -443,7 +443,7 @@ class SubsteppedIslands:
             self.label[connected] = labels.max() if len(labels) else connected.min(initial=len(self.label))
             pair_events.inside[members] = True
             run.wrench[island.members] = 0.0
-            self.asleep[members] = False
+            self.asleep[members] = pair_events.asleep[members] = False
             self.sleep_timer[island.members] = 0.0
         fresh = members[~self._taken[members]]
         self._take_in(run, fresh, island.time)

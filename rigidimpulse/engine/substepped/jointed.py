@@ -12,25 +12,24 @@ from rigidimpulse.core.simd import ROW
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
-from rigidimpulse.dynamics.solvers.time_stepping.solver import step_island, stop_island
+from rigidimpulse.dynamics.solvers.time_stepping.solver import Kept, step_island, stop_island
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper, Fineness, Outcome
-from rigidimpulse.engine.substepped.given_impulses import GivenImpulses
+from rigidimpulse.engine.substepped.given_impulses import log_given
 from rigidimpulse.engine.substepped.trajectories import most_stray
 from rigidimpulse.motion.body_state import BodyState
 
 SUB_STEPS, MOST_SUB_STEPS = 8, 64
 """Sub-steps of a whole step, at least, and at most for what turns fast."""
-BEND: float = 1.5e-2
-"""Skins by which the path of a point may bend in a sub-step, over 8 and over `Accuracy.substep_motion`: contacts close along straight
-lines, so bodies enter by as much."""
+BEND = 0.15
+"""Skins by which the path of a point may bend in a sub-step, over 8 and over the square of `Accuracy.substep_motion`: contacts close along
+straight lines, so bodies enter by as much."""
 MOTION = 1.0
 """Parts of `Accuracy.substep_motion` that touching bodies move until their contacts are looked for again."""
 GAINED: float = 1e-4
 """Part of what moves by which the energy of an island may rise in a step: what the method makes, it takes back; a whip makes ever more."""
 TAKEN = 0.1
 """Part of what moves that the balance of energy may take from an island in a step: more says that the forces were not found."""
-Kept = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 CLOSED, OPEN = TOLERANCES.sub_stepping.joints_closed, TOLERANCES.sub_stepping.joints_open
 
 
@@ -62,7 +61,7 @@ class JointedStepper:
         stepper, accuracy = self._stepper, self._world.accuracy
         pairs, near = stepper.table.pairs, np.zeros(len(stepper.pressed), bool)
         near[stepper.order[pairs.first]] = near[stepper.order[pairs.second]] = True
-        stray = most_stray(run.state.now, members, near, stepper.reach, stepper.skin, BEND * accuracy.substep_motion)
+        stray = most_stray(run.state.now, members, near, stepper.reach, stepper.skin, BEND * accuracy.substep_motion**2)
         pieces = min(max(stray * accuracy.step, SUB_STEPS), MOST_SUB_STEPS)
         return Fineness(accuracy.step / pieces, MOTION * accuracy.substep_motion)
 
@@ -74,10 +73,10 @@ class JointedStepper:
         """
         stepper, which = self._stepper, run.joints.at(self._stepper.members)
         island = self._island(run, which)
-        moment, given = np.zeros((len(self._joints.body_a), 3)), GivenImpulses(stepper)
+        moment, given = np.zeros((len(self._joints.body_a), 3)), np.zeros((len(stepper.table.pairs.first), 10))
         stepper.begin_step()
-        kept = self._stiffening, moment, self._driven, np.zeros(1)
-        worst = self._sub_steps(run, island, kept, given, (end - time) / stepper.sub_steps)
+        kept = Kept(self._stiffening, moment, self._driven, np.zeros(1), given)
+        worst = self._sub_steps(run, island, kept, (end - time) / stepper.sub_steps)
         if not worst <= self._open:
             return None
         stop_island(island, stepper.bodies, stepper.table.arrays, self._world.coefficients, stepper.balance, kept)
@@ -86,7 +85,7 @@ class JointedStepper:
         if not (self._driven[island.members].any() or self._keeps_energy(run, out)):
             return None
         stepper.pressed[stepper.members] = True
-        given.log(run, stepper.members, time, end)
+        log_given(run, stepper, given, (time, end))
         run.joints.note_sub_steps(which, moment / (end - time), (time, end))
         return out
 
@@ -104,21 +103,19 @@ class JointedStepper:
             self._joints, which, now, stepper.bodies.rotation, members, self._column, run.joints.memory, self._allowed
         )
 
-    def _sub_steps(self, run: Run, island: JointedIsland, kept: Kept, given: GivenImpulses, h: float) -> float:
-        """All sub-steps of h s; kept: see `step_island`. Returns the worst gap of a joint, m or rad."""
+    def _sub_steps(self, run: Run, island: JointedIsland, kept: Kept, h: float) -> float:
+        """All sub-steps of h s; returns the worst gap of a joint, m or rad."""
         stepper, worst = self._stepper, 0.0
 
         def look_again() -> None:
             self._hand_over(island.members)
             stepper.look_again_at_all(run)
-            given.forget(stepper)
 
         for some in stepper.sub_steps_between(look_again):
             halved, gap = step_island(
                 island, stepper.bodies, stepper.table.arrays, self._world.coefficients, stepper.balance, kept, some, h
             )
             self.halved, worst = self.halved + halved, max(worst, gap)
-            given.add(stepper)
         return worst
 
     def _keeps_energy(self, run: Run, out: Outcome) -> bool:

@@ -14,11 +14,13 @@ from rigidimpulse.collision.contact_records import (
     FRICTION,
     IMPULSE,
     SEPARATION,
+    SKELETON_B,
     SKIN,
     STATIC_FRICTION,
     in_play,
 )
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.vector import turned_by
 from rigidimpulse.dynamics.constraints.rows import impulse_along, rows_of
 from rigidimpulse.dynamics.solvers.tgs_soft.records import normal_of, point_of
 from rigidimpulse.model.contacts import Contacts
@@ -69,6 +71,36 @@ def contact_points(bodies, now, pairs, points, coefficients, h):
         numbers[4, :m],
     )  # fmt: skip
     return contacts, place[:m]
+
+
+@jit
+def forget_given(bodies, pairs, points):
+    """Count what contact points give from here on: others may have stood in their rows."""
+    for p in range(pairs.first.shape[0]):
+        if in_play(bodies.part, pairs.first[p], pairs.second[p]):
+            for r in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
+                points[r, GIVEN] = points[r, GIVEN + 1] = points[r, GIVEN + 2] = 0.0
+
+
+@jit
+def sum_given(bodies, pairs, points, given):
+    """Add what contact points gave to given (p, 10) of their pairs: impulse, and its size times place, normal and 1."""
+    for p in range(pairs.first.shape[0]):
+        a, b = pairs.first[p], pairs.second[p]
+        if not in_play(bodies.part, a, b):
+            continue
+        for r in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
+            # Squares of impulses below 1e-160 N s are zero, and so is their length.
+            size = np.sqrt(points[r, GIVEN] ** 2 + points[r, GIVEN + 1] ** 2 + points[r, GIVEN + 2] ** 2)
+            if size == 0.0:
+                continue
+            n = normal_of(bodies.position, bodies.rotation, points, r, a, b, pairs.carrier[p])
+            arm = turned_by(bodies.rotation, b, points[r, SKELETON_B], points[r, SKELETON_B + 1], points[r, SKELETON_B + 2])
+            for k in range(3):
+                given[p, k] += points[r, GIVEN + k]
+                given[p, 3 + k] += size * (bodies.position[b, k] + arm[k])
+                given[p, 6 + k] += size * n[k]
+            given[p, 9] += size
 
 
 @jit

@@ -26,7 +26,7 @@ from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.joint import joint_values
 from rigidimpulse.dynamics.constraints.joint_limits import limit_side
 from rigidimpulse.dynamics.constraints.rows import change_velocities, take_rows
-from rigidimpulse.dynamics.solvers.newton import solve_newton
+from rigidimpulse.dynamics.solvers.newton import prepare, solve_prepared
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import set_orientation, turn_freely
 
 STIFFEN, FORGET = 1.0, 0.1
@@ -122,6 +122,7 @@ def fly_and_close(island, bodies, rows, start, begin, landed, h):
     joints, which, now, members = island.joints, island.which, island.bodies, island.members
     hard, value = hard_rows(joints, which, start), np.empty(rows.bias.shape[0] - start)
     closing, worst = take_rows(rows, hard), 0.0
+    factored = prepare(closing, members.shape[0])
     for round_ in range(MOST_ROUNDS):
         fly(bodies, now, members, begin, landed, h)
         joint_values(joints, which, bodies.position, bodies.rotation, island.memory.angle, value)
@@ -132,7 +133,7 @@ def fly_and_close(island, bodies, rows, start, begin, landed, h):
             closing.bias[c], closing.impulse[c] = x / h, 0.0
         if worst <= island.allowed or round_ == MOST_ROUNDS - 1 or not np.isfinite(worst):
             break
-        solve_newton(closing, members.shape[0], CLOSED_TO * island.allowed / h)
+        solve_prepared(closing, factored, CLOSED_TO * island.allowed / h)
         change_velocities(now, members, closing)
         for c in range(hard.shape[0]):
             rows.impulse[hard[c]] += closing.impulse[c]

@@ -19,6 +19,8 @@ need to be the more, the heavier the load.
 Source: Stewart and Trinkle 1996, Anitescu and Potra 1997 (time stepping with contact and friction at velocity level).
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rigidimpulse.collision.contact_records import SKIN, SUPPORT
@@ -31,7 +33,13 @@ from rigidimpulse.dynamics.constraints.jointed_island import count_joint_rows
 from rigidimpulse.dynamics.constraints.rows import change_velocities, contact_rows
 from rigidimpulse.dynamics.constraints.slip import solve_until_slip
 from rigidimpulse.dynamics.solvers.time_stepping.biases import fill_contact_biases, fill_joint_biases, fill_still_biases
-from rigidimpulse.dynamics.solvers.time_stepping.contact_points import contact_points, keep_for_next, start_from_kept
+from rigidimpulse.dynamics.solvers.time_stepping.contact_points import (
+    contact_points,
+    forget_given,
+    keep_for_next,
+    start_from_kept,
+    sum_given,
+)
 from rigidimpulse.dynamics.solvers.time_stepping.flight import carry_supports, fly_and_close, kick, set_inertia, stiffen
 
 GIVE_UP, MOST_HALVED = 100.0, 32.0
@@ -39,17 +47,26 @@ ACCURATE, SLIP, LAST = TOLERANCES.sub_stepping.joint_residual, TOLERANCES.sub_st
 TINY = TOLERANCES.arithmetic.least_divisor
 
 
+class Kept(NamedTuple):
+    """What is kept from sub-step to sub-step of a step, and brought up to date."""
+
+    stiffening: np.ndarray  # (n,) kg m2, kept from step to step
+    moment: np.ndarray  # (j, 3) N s, impulses of the joints on their b
+    driven: np.ndarray  # (n,) bool, members that drives, springs or moving supports may give energy to
+    before: np.ndarray  # (1,) s, length of the last sub-step, 0 at the start
+    given: np.ndarray  # (p, 10) of the pairs in the table of contacts, see `sum_given`
+
+
 @jit_making_arrays
 def step_island(island, bodies, table, coefficients, balance, kept, sub_steps, h):
     """Step an island by `sub_steps` sub-steps of h s.
 
     island: its joints and members by rank, with the velocities; bodies: the solver's bodies, with the poses. table: of contacts. balance:
-    its clusters are joined, and it is given the work of drives and moving supports. kept: stiffening (n,) kg m2, which is updated; moment
-    (j, 3) N s, to which the impulses of the joints on their b are added; driven (n,) bool, members that drives, springs or moving supports
-    may give energy to; before (1,) s, length of the last sub-step of the step, 0 at its start, which is updated. Returns how many sub-steps
-    were halved, and the worst gap of a joint, m or rad.
+    its clusters are joined, and it is given the work of drives and moving supports. kept: `Kept`. Returns how many sub-steps were halved,
+    and the worst gap of a joint, m or rad.
     """
-    members, now, stiffening, last = island.members, island.bodies, kept[0], kept[3]
+    members, now, stiffening = island.members, island.bodies, kept.stiffening
+    forget_given(bodies, table.pairs, table.points)
     supports = _supports(bodies)
     left, step, halved, worst = sub_steps * h, h, np.int64(0), 0.0
     begin, spin = np.empty((bodies.part.shape[0], 7)), np.empty((bodies.part.shape[0], 3))
@@ -74,9 +91,10 @@ def step_island(island, bodies, table, coefficients, balance, kept, sub_steps, h
         kick(bodies, now, members, 0.5 * step)
         worst = max(worst, gap)
         left -= step
-        last[0] = step
+        kept.before[0] = step
         # After a halved sub-step the next ones may be whole again.
         step = min(2.0 * step, h)
+    sum_given(bodies, table.pairs, table.points, kept.given)
     return halved, worst
 
 
@@ -153,7 +171,7 @@ def _sub_step(island, bodies, table, coefficients, balance, kept, flight, h):
 
     flight: see `flight.fly`; and the gap up to which things are counted and kept for later: else the caller takes the sub-step back.
     """
-    members, now, (stiffening, moment, driven, before) = island.members, island.bodies, kept
+    members, now, driven, moment = island.members, island.bodies, kept.driven, kept.moment
     contacts, place = contact_points(bodies, now, table.pairs, table.points, coefficients, h)
     start_of = contact_rows(now, contacts, members, island.number, count_joint_rows(island.joints, island.which))
     rows, start = start_of.rows, start_of.rows.bias.shape[0] - count_joint_rows(island.joints, island.which)
@@ -162,7 +180,7 @@ def _sub_step(island, bodies, table, coefficients, balance, kept, flight, h):
     for i in members:
         pull = max(pull, np.sqrt(bodies.gravity[i, 0] ** 2 + bodies.gravity[i, 1] ** 2 + bodies.gravity[i, 2] ** 2))
     u = fill_contact_biases(now, contacts, start_of, table.points[place, SKIN], pull, h)
-    direction = fill_joint_biases(island, rows, start, h, before[0])
+    direction = fill_joint_biases(island, rows, start, h, kept.before[0])
     scale = max(_fastest(rows), h * pull) + TINY
     _set_friction(start_of, contacts, u, SLIP * scale)
     turned, fell = _turned(bodies, members), _falling(bodies, now, members)
@@ -184,7 +202,7 @@ def _sub_step(island, bodies, table, coefficients, balance, kept, flight, h):
     own = np.zeros(moment.shape)
     add_forces(island.joints, island.which, rows.impulse[start:], direction, 1.0, own)
     _remember_forces(island, rows, start, h)
-    stiffen(island, stiffening, own, h)
+    stiffen(island, kept.stiffening, own, h)
     for j in island.which:
         for k in range(3):
             moment[j, k] += own[j, k]
@@ -251,13 +269,13 @@ def _remember_forces(island, rows, start, h):
 @jit_making_arrays
 def stop_island(island, bodies, table, coefficients, balance, kept):
     """Make the rates of joints and closed contacts vanish at the end of the sub-steps of a step; arguments as of `step_island`."""
-    members, now, (stiffening, moment, driven, before) = island.members, island.bodies, kept
-    set_inertia(bodies, now, members, stiffening)
+    members, now, driven = island.members, island.bodies, kept.driven
+    set_inertia(bodies, now, members, kept.stiffening)
     contacts, _ = contact_points(bodies, now, table.pairs, table.points, coefficients, 0.0)
     of_contacts = contact_rows(now, contacts, members, island.number, count_joint_rows(island.joints, island.which))
     rows = of_contacts.rows
     start = rows.bias.shape[0] - count_joint_rows(island.joints, island.which)
-    direction = fill_still_biases(island, contacts, of_contacts, start, before[0])
+    direction = fill_still_biases(island, contacts, of_contacts, start, kept.before[0])
     scale = _fastest(rows) + TINY
     turned = _turned(bodies, members)
     given = _energies(bodies, now, members, turned)
@@ -267,4 +285,4 @@ def stop_island(island, bodies, table, coefficients, balance, kept):
     for k in range(members.shape[0]):
         if driven[members[k]]:
             balance.given[members[k]] += given[k]
-    add_forces(island.joints, island.which, rows.impulse[start:], direction, 1.0, moment)
+    add_forces(island.joints, island.which, rows.impulse[start:], direction, 1.0, kept.moment)
