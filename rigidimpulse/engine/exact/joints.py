@@ -192,11 +192,9 @@ class JointState:
             return
         before = mechanical_energy(now, run.world.constants, members)
         arrived = np.hstack([now.velocity[members], now.angular_velocity[members]])
-        for i in members:
-            # A body whose only joint let go in the last sub-step has none any more.
-            held = memory.wrench[i] * elapsed[self.at([i])].max(initial=0.0)
-            now.velocity[i] -= now.inv_mass[i] * held[:3]
-            now.angular_velocity[i] -= dot(now.inv_inertia[i], held[3:])
+        held = memory.wrench[members] * self._longest(elapsed, which)[members, None]
+        now.velocity[members] -= now.inv_mass[members, None] * held[:, :3]
+        now.angular_velocity[members] -= dot(now.inv_inertia[members], held[:, None, 3:])
         jointed = self._jointed(run, island)
         if close_joints(jointed, island.contacts):
             refresh_pose(members, now, state.rotation, state.trajectory.inertia)
@@ -212,6 +210,13 @@ class JointState:
         after = mechanical_energy(now, run.world.constants, members)
         run.log.account(island.time, "joints", after - before)
         self._note_drift(which, after, kinetic_energy(now, run.world.constants, members))
+
+    def _longest(self, elapsed: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """The longest of the times elapsed (j,) of the joints `which` of each body (n,), s: 0 where the only one has let go."""
+        out = np.zeros(len(self._dynamic))
+        for ends in (self.table.body_a[which], self.table.body_b[which]):
+            np.maximum.at(out, ends[ends >= 0], elapsed[which][ends >= 0])
+        return out
 
     def _land(self, run: Run, island: Island, elapsed: np.ndarray) -> None:
         """End the island's flight, as it was planned: its joints are closed and stopped already."""
@@ -267,24 +272,27 @@ class JointState:
 
     def sub_step(self, run: Run, island: Island, h: float) -> float:
         """Length of the next sub-step: h, the rest of the step, or a part of it. Very short rests are planned as longer ones."""
-        world, now = run.world, run.state.now
+        world, now, which = run.world, run.state.now, island.joints
         fastest = 0.0
-        sways, swings = self._tension_rates(run, island.joints)
-        rates = max(sways, self._spring_rate(island.joints))
-        for j in island.joints.tolist():
+        sways, swings = self._tension_rates(run, which)
+        rates = max(sways, self._spring_rate(which))
+        ends = [self.table.body_a[which], self.table.body_b[which]]
+        if len(which):
+            # The world stands still.
+            spins = [np.where(i[:, None] >= 0, now.angular_velocity[i], 0.0) for i in ends]
+            speeds = [np.where(i[:, None] >= 0, now.velocity[i], 0.0) for i in ends]
+            fastest = float(length(spins[1] - spins[0]).max())
+            # A string or rod turns without its bodies.
+            rods = self._rod[which] > 0.0
+            fastest = max(fastest, float((length(speeds[1] - speeds[0])[rods] / self._rod[which[rods]]).max(initial=0.0)))
+        for j in which[self._slides[which]].tolist():
             a, b = int(self.table.body_a[j]), int(self.table.body_b[j])
-            spins = [now.angular_velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
-            fastest = max(fastest, float(length(spins[1] - spins[0])))
-            if self._rod[j] > 0.0:
-                # A string or rod turns without its bodies.
-                speeds = [now.velocity[i] if i >= 0 else np.zeros(3) for i in (a, b)]
-                fastest = max(fastest, float(length(speeds[1] - speeds[0])) / self._rod[j])
-            if self._slides[j] and min(a, b) >= 0:
+            if min(a, b) >= 0:
                 fastest = max(fastest, _slide_rate(now, a, b, world.accuracy.step))
-        waits = self.release_time[island.joints] - island.time
+        waits = self.release_time[which] - island.time
         h = min(h, float(waits[waits > 0.0].min(initial=np.inf)))
         step = world.accuracy.step
-        drifts = self.drift[island.joints].max(initial=0.0) > DRIFT
+        drifts = self.drift[which].max(initial=0.0) > DRIFT
         pieces = max(
             math.ceil(fastest * step / TURN),
             min(math.ceil(rates * step / SWAY), MOST_SUB_STEPS if drifts else MOST_SWAYS),
@@ -309,21 +317,19 @@ class JointState:
 
         Returns that of all others, and that of bodies that only swing about a point which cannot be moved.
         """
-        world, table, squares = run.world, self.table, {}
-        force = np.linalg.norm(self.pull[which], axis=1)
-        for bodies, anchors in ((table.body_a[which], table.anchor_a[which]), (table.body_b[which], table.anchor_b[which])):
-            for i, f, r, rod in zip(
-                bodies.tolist(), force.tolist(), np.linalg.norm(anchors, axis=1).tolist(), self._rod[which].tolist(), strict=True
-            ):
-                # A body that hangs at its centre does not sway; files of single precision miss the centre by some 1e-8.
-                if i >= 0 and world.dynamic[i] and r > CENTRED * rod:
-                    square = f * (r / world.inertia[i].min() + world.inv_mass[i] / r)
-                    squares[i] = squares.get(i, 0.0) + square
-        swinging = {self.movable_end(j) for j in which[self._pins[which]].tolist()}
-        swinging = {i for i in swinging if len(self.at([i])) == 1}
-        others = (square for i, square in squares.items() if i not in swinging)
-        own = (square for i, square in squares.items() if i in swinging)
-        return math.sqrt(max(others, default=0.0)), math.sqrt(max(own, default=0.0))
+        world, table = run.world, self.table
+        force, rod = np.linalg.norm(self.pull[which], axis=1), self._rod[which]
+        bodies = np.concatenate([table.body_a[which], table.body_b[which]])
+        arm = np.concatenate([np.linalg.norm(anchor[which], axis=1) for anchor in (table.anchor_a, table.anchor_b)])
+        # A body that hangs at its centre does not sway; files of single precision miss the centre by some 1e-8.
+        sways = (bodies >= 0) & world.dynamic[bodies] & (arm > CENTRED * np.tile(rod, 2))
+        i, r = bodies[sways], arm[sways]
+        square = np.tile(force, 2)[sways] * (r / world.inertia[i].min(axis=1) + world.inv_mass[i] / r)
+        squares = np.bincount(i, square, minlength=world.num_bodies)
+        swings = np.zeros(world.num_bodies, bool)
+        for k in {self.movable_end(j) for j in which[self._pins[which]].tolist()}:
+            swings[k] = len(self.at([k])) == 1
+        return math.sqrt(squares[~swings].max(initial=0.0)), math.sqrt(squares[swings].max(initial=0.0))
 
     def hold(
         self, run: Run, island: Island, contacts: Contacts, turning: np.ndarray, force: np.ndarray, rest: float, rolling: Rolling
