@@ -96,17 +96,17 @@ def kernels_to_compile(world: World, with_events: bool, with_substepped: bool, i
     joints = bool(world.joints_of_scene)
     needed = {
         CONTACTS: world.can_collide, EVENTS: with_events, SUBSTEPPED: with_substepped, JOINTS: joints,
-        STEPPED_JOINTS: with_substepped and joints, ANY_SHAPES: with_substepped and _has_other_shapes(world),
+        STEPPED_JOINTS: with_substepped and joints, ANY_SHAPES: with_substepped and world.can_collide and _has_other_shapes(world),
         UNDER_FORCES: world.can_collide and bool(world.force_tables),
     }  # fmt: skip
     return [kind for kind in LAST if needed[kind] and not is_ready(_last_kernel(kind))]
 
 
 def _has_other_shapes(world: World) -> bool:
-    """Whether a movable body is neither a ball nor made of convex polyhedra, for which sub-stepped islands have kernels of their own."""
+    """Whether a body is no half space nor made of convex polyhedra, for whose pairs sub-stepped islands have kernels of their own."""
     geometry = world.geometry
     polyhedra = convex_polyhedra(geometry, world.convex_depths) | several_polyhedra(geometry)
-    return bool(np.any(world.dynamic & ~world.ball & ~polyhedra[world.shape_of_body]))
+    return bool(np.any(~world.half_space & ~polyhedra[world.shape_of_body]))
 
 
 def _last_kernel(kind: str) -> Any:

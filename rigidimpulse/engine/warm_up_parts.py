@@ -292,7 +292,7 @@ def _step_jointed(run: Run) -> None:
 
 
 def _find_contacts_of_any_shapes(run: Run) -> None:
-    """Contacts of a capsule in a sub-stepped island; what of a body with an inset surface is inside others."""
+    """Contacts of a capsule in a sub-stepped island, and gaps of pairs, which tell what is inside others."""
     stepper, members = ContactStepper(run.world, run.world.dynamic, COARSE), np.array([1])
     run.state.now.inv_inertia[1] = np.eye(3)
     stepper.set_up(run, members, np.array([0]), STEP)

@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+import trimesh
 
 import rigidimpulse as ri
 from rigidimpulse.core.kernels import Kernel
@@ -87,6 +88,22 @@ def test_only_what_a_scene_needs_and_the_cache_lacks_is_compiled():
     assert warm_up.kernels_to_compile(flies, True, True, never) == ["impacts of balls", "sub-stepped islands"]
     assert "joints" in warm_up.kernels_to_compile(arm, False, False, never)
     assert warm_up.kernels_to_compile(arm, True, True, always) == []
+
+
+def test_kernels_of_any_shapes_are_for_what_is_not_made_of_polyhedra():
+    """A bowl that stands counts as well as what falls into it."""
+    ring = ri.Shape.mesh(*_square_ring())
+    box, capsule = ri.Shape.box(0.2), ri.Shape.capsule(0.1, 0.2)
+    for shape, motion, needed in ((box, "static", False), (ring, "static", True), (capsule, "dynamic", True)):
+        scene = ri.Scene(bodies=[ri.Body("box", box, position=(0, 0, 1)), ri.Body("other", shape, motion=motion)])
+        kinds = warm_up.kernels_to_compile(compile_scene(scene), False, True, never)
+        assert ("any shapes in sub-stepped islands" in kinds) == needed
+
+
+def _square_ring():
+    """Vertices and faces of a ring of square section."""
+    ring = trimesh.creation.annulus(0.2, 0.4, 0.2, sections=8)
+    return ring.vertices, ring.faces
 
 
 SECOND_SCENE = """
