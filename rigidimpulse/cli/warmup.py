@@ -12,7 +12,7 @@ from rigidimpulse.cli.jobs import CHECK_FAILED
 @click.command()
 @click.option("--processes", type=click.IntRange(min=1), help="How many compile at a time.  [default: one a core]")
 def warmup(processes: int | None) -> None:
-    """Compile all kernels that a first run may need, once on this machine; what is compiled already is skipped."""
+    """Compile the kernels that first runs of rigid bodies need, once on this machine; what is compiled already is skipped."""
     from time import perf_counter
 
     from tqdm import tqdm

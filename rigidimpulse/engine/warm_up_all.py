@@ -1,4 +1,4 @@
-"""All kernels that a first run may call, compiled before it: every kind.
+"""The kernels that a first run of rigid bodies may call, compiled before it. Those of flexible bodies and of the penalty method are not.
 
 Each part (see `warm_up_parts.py`) is compiled in a process of its own, several at a time on all cores. A note beside the kernels
 says that a part is done; its name has the digest of all sources that a part is compiled from. A part without a note whose kernels lie in
