@@ -22,7 +22,7 @@ from llvmlite import ir
 from numba import typeof, types
 from numba.extending import NativeValue, infer_getattr, lower_getattr_generic, models, register_model, typeof_impl, unbox
 
-from rigidimpulse.core.numba_private import AttributeTemplate
+from rigidimpulse.core.numba_private import AttributeTemplate, create_struct_proxy
 
 
 class Record:
@@ -40,7 +40,7 @@ class Record:
         laid_out = [_words(part) for part in record]
         self._first = list(accumulate(map(len, laid_out), initial=0))
         self._words = np.array([word for part in laid_out for word in part], np.int64)
-        self.address = int(self._words.__array_interface__["data"][0])
+        self.address = self._words.ctypes.data
 
     def replace(self, place: int, part: Any) -> None:
         """Put another part of the same type in a place of the tuple, if it is another."""
@@ -87,7 +87,7 @@ def _words(value: Any) -> list[int]:
         return [word for part in value for word in _words(part)]
     if isinstance(value, np.ndarray):
         # Nobody counts who holds the array, so it has neither a counter nor a parent.
-        return [0, 0, value.size, value.itemsize, value.__array_interface__["data"][0], *value.shape, *value.strides]
+        return [0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
     if isinstance(value, (float, np.floating)):
         return [int(np.float64(value).view(np.int64))]
     if isinstance(value, (int, np.integer)) and not isinstance(value, bool):
@@ -150,4 +150,12 @@ def _read_field(target: Any, builder: Any, record: Any, address: Any, name: str)
     member = builder.gep(pointer, [ir.Constant(word, 0), ir.Constant(word, place)])
     if _is_tuple(kind):
         return builder.bitcast(member, ir.IntType(8).as_pointer())
-    return target.unpack_value(builder, kind, member)
+    value = target.unpack_value(builder, kind, member)
+    return _nobody_counts(target, builder, kind, value) if isinstance(kind, types.Array) else value
+
+
+def _nobody_counts(target: Any, builder: Any, kind: types.Array, value: Any) -> Any:
+    """The same array, of which the compiler knows that nobody counts who holds it: it leaves out what would."""
+    array = create_struct_proxy(kind)(target, builder, value)
+    array.meminfo, array.parent = (ir.Constant(field.type, None) for field in (array.meminfo, array.parent))
+    return array._getvalue()

@@ -42,7 +42,8 @@ FORCE = np.dtype(
     ]
 )
 """A held contact: what touches, its force in (n, t1, t2) [N], since when [s], and whether it slipped then."""
-FIRST_PAIRS, FIRST_HELD, FIRST_FORCES = 256, 64, 256
+FIRST_PAIRS, FIRST_HELD, FIRST_FORCES = 1024, 512, 4096
+"""Space at first: for more than the compiled loop asks to have free before the first event of a small scene."""
 LEAST_STRETCH = 4
 """Entries that a held pair has space for at first."""
 PAIRS, HELD_PAIRS, FORCES = np.arange(3)

@@ -38,7 +38,8 @@ CAUSES = ("impact", "stick", "position correction", "energy correction", "joints
 """What changes mechanical energy at an instant, by the numbers that a log keeps."""
 IMPACT, STICK, POSITION_CORRECTION, ENERGY_CORRECTION = np.arange(4)
 """Numbers of the first of them, for kernels."""
-FIRST_ROWS = 64
+FIRST_ROWS = 8192
+"""More than the compiled loop asks to have free before the first event of a small scene."""
 
 
 class LogBuffers(NamedTuple):

@@ -68,12 +68,12 @@ class Stopwatch:
     def __init__(self) -> None:
         """Note the counters of all kernels, whoever ran them before."""
         self._start = perf_counter()
-        self._before = {kernel: (kernel.calls, kernel.seconds, kernel.preparing) for kernel in KERNELS}
+        self._before = {kernel: (kernel.calls, kernel.seconds, kernel.preparing) for kernel in KERNELS if kernel.calls}
 
     def read(self, plan: Plan) -> Profile:
         """What went by since the start."""
         kernels, preparing = {}, 0.0
-        for kernel in KERNELS:
+        for kernel in (kernel for kernel in KERNELS if kernel.calls):
             calls, spent, prepared = self._before.get(kernel, (0, 0.0, 0.0))
             preparing += kernel.preparing - prepared
             if kernel.calls > calls and kernel.seconds > spent:

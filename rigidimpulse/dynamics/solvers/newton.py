@@ -139,10 +139,10 @@ def _add_outer(blocks, place, jacobian, row, first, right, start):
         blocks[place, i, 5] += left * r5
 
 
-@jit_making_arrays
-def _assemble(rows, slope, slot, blocks, n):
-    """I + Jh^T slope Jh."""
-    jacobian, kinds, masters, right = rows.jacobian, rows.kind, rows.master, np.empty(12)
+@jit
+def _assemble(rows, slope, slot, blocks, right, n):
+    """I + Jh^T slope Jh; right (12,): working memory."""
+    jacobian, kinds, masters = rows.jacobian, rows.kind, rows.master
     for place in range(blocks.shape[0]):
         for i in range(6):
             for j in range(6):
@@ -231,6 +231,19 @@ class Factored(NamedTuple):
     blocks: np.ndarray  # (num_blocks, 6, 6) factors
     pivots: np.ndarray  # (n, 6)
     slope: np.ndarray  # (r, 3) of which they are; no numbers before the first time
+    right: np.ndarray  # (12,) working memory
+
+
+class Search(NamedTuple):
+    """Working memory of `_newton`, for all solves of a system."""
+
+    change: np.ndarray  # (n, 6) y less what it is at q
+    trial: np.ndarray  # (n, 6) of the line search
+    residual: np.ndarray  # (n, 6) F
+    step: np.ndarray  # (n, 6)
+    u: np.ndarray  # (r,) m/s
+    line: np.ndarray  # (r,) m/s
+    slope: np.ndarray  # (r, 3) -dp/du
 
 
 @jit
@@ -242,18 +255,26 @@ def _factor_again(rows, factored, slope):
         same = same and slope[i, 0] == known[i, 0] and slope[i, 1] == known[i, 1] and slope[i, 2] == known[i, 2]
     if same:
         return
-    _assemble(rows, slope, factored.elimination.slot, factored.blocks, factored.pivots.shape[0])
+    _assemble(rows, slope, factored.elimination.slot, factored.blocks, factored.right, factored.pivots.shape[0])
     factor(factored.elimination, factored.blocks, factored.pivots)
     copy_matrix(slope, known)
 
 
 @jit_making_arrays
-def _newton(rows, factored, law, p, target):
+def _search(n, count):
+    """Working memory for `count` rows of n bodies."""
+    change, trial, residual, step = np.empty((n, 6)), np.empty((n, 6)), np.empty((n, 6)), np.empty((n, 6))
+    return Search(change, trial, residual, step, np.empty(count), np.empty(count), np.empty((count, 3)))
+
+
+@jit
+def _newton(rows, factored, law, search, p, target):
     """Find p with F = 0. Returns whether it converged (or cannot be improved further)."""
-    n, count = factored.pivots.shape[0], p.shape[0]
-    change, trial = np.zeros((n, 6)), np.empty((n, 6))
-    residual, step = np.empty((n, 6)), np.empty((n, 6))
-    u, line, slope = np.empty(count), np.empty(count), np.empty((count, 3))
+    n, change, trial, residual, step = factored.pivots.shape[0], search.change, search.trial, search.residual, search.step
+    u, line, slope = search.u, search.line, search.slope
+    for i in range(n):
+        for k in range(6):
+            change[i, k] = 0.0
     size = _evaluate(rows, law, change, u, p, slope, residual)
     for _ in range(MAX_INNER):
         if _speed(rows, residual, line) <= target:
@@ -305,7 +326,7 @@ def prepare(rows, n):
     """What a solver of these rows of n movable bodies needs, `Factored`: the same for other biases, bounds and impulses."""
     elimination = plan_elimination(rows.first, rows.second, n)
     unknown = np.full((rows.bias.shape[0], 3), np.nan)
-    return Factored(elimination, np.empty((elimination.num_blocks, 6, 6)), np.empty((n, 6), np.int64), unknown)
+    return Factored(elimination, np.empty((elimination.num_blocks, 6, 6)), np.empty((n, 6), np.int64), unknown, np.empty(12))
 
 
 @jit_making_arrays
@@ -324,7 +345,7 @@ def solve_prepared(rows, factored, target):
     weight = np.empty(count)
     row_weights(rows, weight)
     y, u, r = np.empty((n, 6)), np.empty(count), np.empty(count)
-    trial, q, frozen = rows.impulse.copy(), rows.impulse.copy(), np.full(count, -1.0)
+    trial, q, frozen, search = rows.impulse.copy(), rows.impulse.copy(), np.full(count, -1.0), _search(n, count)
     _velocities(rows, q, y, u)
     best, largest = natural_residual(rows, u, q, weight), _largest(q)
     k, free_k, failures, stagnant, idle, previous, convex = REGULARISATION_START, REGULARISATION_FREE, 0, 0, 0, best, False
@@ -335,7 +356,7 @@ def solve_prepared(rows, factored, target):
             # With frozen radii the problem is convex: the last resort.
             frozen[i] = rows.coefficient[i] * max(q[rows.master[i]], 0.0) if convex else -1.0
             r[i] = weight[i] * (min(k, free_k) if rows.kind[i] == FREE else k)
-        solved = _newton(rows, factored, RegularisedLaw(u, q, r, frozen), trial, 0.05 * target)
+        solved = _newton(rows, factored, RegularisedLaw(u, q, r, frozen), search, trial, 0.05 * target)
         # The line search failed: more regularisation, and at last a step with frozen radii.
         if not solved and not convex:
             failures += 1

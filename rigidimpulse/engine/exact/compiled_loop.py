@@ -116,6 +116,7 @@ class CompiledLoop:
         )  # fmt: skip
         self._elsewhere = np.zeros(n, bool)
         self._cycles, self._calls = np.zeros(VERBS, np.int64), np.zeros(VERBS, np.int64)
+        self._lines = {verb: [line for line in run.plan.lines if line.included and line.name in names] for verb, names in EFFECTS.items()}
         self._scratch = np.empty((SCRATCH_ROWS, 2), np.int64)
         self._reports = _make_reports(FIRST_REPORTS)
         state = run.state
@@ -162,7 +163,7 @@ class CompiledLoop:
         while how not in (AT_END, AT_EVENT):
             start, before = perf_counter(), self._cycles.copy()
             how, time, is_given = run_events(self._updated(run, pair_events), mark, is_given, time, pair_events.end, self._scratch)
-            self._account(run, perf_counter() - start, before)
+            self._account(perf_counter() - start, before)
             self._tell(run, pair_events)
             if how == NO_CAPACITY:
                 self._grow(run)
@@ -201,12 +202,12 @@ class CompiledLoop:
             run.log.report(float(row["time"]), kind, names, remedy.format(value=float(row["value"])))
         self._reports.used[[ROWS, BODIES]] = 0
 
-    def _account(self, run: Run, seconds: float, before: np.ndarray) -> None:
+    def _account(self, seconds: float, before: np.ndarray) -> None:
         """Give the time of the kernel to the effects whose verbs it called, in proportion to the processor's cycles."""
-        spent = (self._cycles - before).astype(float)
-        for verb, effects in EFFECTS.items():
-            lines = [run.plan.line(name) for name in effects if run.plan.includes(name)]
+        spent, calls = (self._cycles - before).tolist(), self._calls.tolist()
+        of_cycle = seconds / max(sum(spent), 1)
+        for verb, lines in self._lines.items():
             for line in lines:
-                line.seconds += seconds * spent[verb] / max(spent.sum(), 1.0) / len(lines)
-                line.calls += int(self._calls[verb])
+                line.seconds += of_cycle * spent[verb] / len(lines)
+                line.calls += calls[verb]
         self._calls[:] = 0
