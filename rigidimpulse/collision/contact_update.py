@@ -48,6 +48,48 @@ class Searched(NamedTuple):
     far: np.ndarray  # (k,) m, distance of the search
 
 
+class Asked(NamedTuple):
+    """What `manifold.dispatch` is asked about the k pairs, and where their bodies, of the n of the scene, are."""
+
+    a: np.ndarray  # (k,)
+    b: np.ndarray  # (k,)
+    shown: np.ndarray  # (k,) m, distance of the search, between the smaller shapes
+    far: np.ndarray  # (k,) m, the same between the true ones
+    position: np.ndarray  # (n, 3) m
+    orientation: np.ndarray  # (n, 4)
+    rotation: np.ndarray  # (n, 3, 3)
+
+
+def make_asked(pairs: int, number: int) -> Asked:
+    """Space for questions about `pairs` pairs of `number` bodies."""
+    a, b, shown, far = np.zeros(pairs, np.int64), np.zeros(pairs, np.int64), np.zeros(pairs), np.zeros(pairs)
+    return Asked(a, b, shown, far, np.zeros((number, 3)), np.zeros((number, 4)), np.zeros((number, 3, 3)))
+
+
+@jit
+def ask_general(smaller, taken_off, bodies, pairs, places, margins, order, asked):
+    """Write what is asked about the pairs at `places` (k,), whose contacts are wanted within margins (k,) m.
+
+    taken_off (n,): m, by which the surface of a smaller shape is inside the true one at most; order (n,): indices of the scene by rank.
+    """
+    depth, position, orientation, rotation = smaller.depth, bodies.position, bodies.orientation, bodies.rotation
+    for k in range(places.shape[0]):
+        first, second = pairs.first[places[k]], pairs.second[places[k]]
+        # A wide margin is expensive for meshes.
+        far = margins[k] if depth[first] + depth[second] > 0.0 else FARTHER * margins[k]
+        asked.a[k], asked.b[k], asked.far[k] = order[first], order[second], far
+        asked.shown[k] = far + taken_off[first] + taken_off[second]
+        # In the middle of a step bodies are elsewhere than at its start.
+        for i in (first, second):
+            at = order[i]
+            for j in range(3):
+                asked.position[at, j] = position[i, j]
+                for c in range(3):
+                    asked.rotation[at, j, c] = rotation[i, j, c]
+            for j in range(4):
+                asked.orientation[at, j] = orientation[i, j]
+
+
 @jit
 def _contradicts(bodies, pairs, p, points, new, new_end):
     """Whether the new contacts of a pair are impossible: there are none though an old one is closed, or its normal has turned round."""

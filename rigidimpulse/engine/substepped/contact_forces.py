@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from functools import partial
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +28,7 @@ from rigidimpulse.collision.contact_cache import (
 )
 from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT
 from rigidimpulse.collision.contact_table import ContactTable
-from rigidimpulse.collision.contact_update import FARTHER, Searched, SmallerShapes, store_contacts
+from rigidimpulse.collision.contact_update import Searched, SmallerShapes, ask_general, make_asked, store_contacts
 from rigidimpulse.collision.fat_boxes import BodyBounds, FatBoxes
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.contact_points import TILT
@@ -198,16 +199,18 @@ class ContactStepper:
         self.reach = np.where(world.ball, 0.0, world.bound_radius)
         convex = convex_polyhedra(world.geometry, world.convex_depths)
         # Soft contacts sink in, and the contact kernels need a gap: smaller shapes for the search.
-        inset, depth, self._back = inset_surfaces(world.shapes, world.geometry, convex, dynamic_shapes)
+        inset, depth, back = inset_surfaces(world.shapes, world.geometry, convex, dynamic_shapes)
         self.geometry, factor = shrunk_geometry(inset, world.convex_depths, dynamic_shapes)
         self.shapes = make_polyhedra(world.geometry, convex, several=several_polyhedra(world.geometry))
-        self._solids, drum, self._inset = solids(world.shapes, world.geometry, convex, self.shapes)
+        solid_shapes, drum, inset_of_solids = solids(world.shapes, world.geometry, convex, self.shapes)
         convex |= drum
         kinds = world.shape_of_body[self.order]
-        self._factor, self._depth, self._convex = factor[kinds], depth[kinds], convex[kinds]
+        self._depth = depth[kinds]
+        self._smaller = SmallerShapes(world.geometry, self.geometry, factor[kinds], back, self._depth, convex[kinds], solid_shapes)
+        self._convex, self._asked = Convex(self.shapes, solid_shapes, inset_of_solids), make_asked(0, n)
         bound = np.where(np.isfinite(world.bound_radius), world.bound_radius, 0.0)
         self._cornered = (world.flat & ~world.half_space)[self.order]
-        self._taken_off = self._depth + (1.0 - self._factor) * bound[self.order]
+        self._taken_off = self._depth + (1.0 - self._smaller.factor) * bound[self.order]
         self.bodies = self._make_bodies()
         self._weights = Weights(world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order]))
         self.balance = make_balance(n)
@@ -348,12 +351,11 @@ class ContactStepper:
         if capacity > len(self._places):
             self._places, self._margins = reserve((2 * capacity,), np.int64), reserve((2 * capacity,), np.float64)
         while True:
-            convex = Convex(self.shapes, self._solids, self._inset)
             limits = Limits(self.ahead, SAME * self.motion, kept, self._fall(self.ahead))
             outcome = self._sharing.call(find_contacts, [
                 (
-                    convex, self.bodies, table.arrays, Share(share, shares, self._places, self._margins), limits, self.world.coefficients,
-                    self._workspaces[share],
+                    self._convex, self.bodies, table.arrays, Share(share, shares, self._places, self._margins), limits,
+                    self.world.coefficients, self._workspaces[share],
                 )
                 for share in range(shares)
             ])  # fmt: skip
@@ -365,42 +367,40 @@ class ContactStepper:
                 self._workspaces = [make_workspace(2 * len(workspace.parts.real)) for workspace in self._workspaces]
             table.grow(len(self._workspaces[0].parts.real))
         self._looked_at = sum(looked_at for looked_at, _ in outcome)
-        begins = [share_of(number, share, shares) for share in range(shares)]
-        waits = np.concatenate([np.arange(begin, begin + waiting) for begin, (_, waiting) in zip(begins, outcome, strict=True)])
-        if len(waits):
+        if shares == 1:
+            waits = slice(0, outcome[0][1])
+        else:
+            begins = [share_of(number, share, shares) for share in range(shares)]
+            waits = np.concatenate([np.arange(begin, begin + waiting) for begin, (_, waiting) in zip(begins, outcome, strict=True)])
             # In order of the pairs, however many shares there are.
             waits = waits[np.argsort(self._places[waits])]
+        if len(self._places[waits]):
             self._look_at_general(run, self._places[waits], self._margins[waits])
 
     def _look_at_general(self, run: Run, places: np.ndarray, margin: np.ndarray) -> None:
         """Find the contacts of pairs at `places` within margins (k,) m by the kernels of `collision.manifold`."""
-        table, world, pairs = self.table, self.world, self.table.pairs
-        first, second = pairs.first[places], pairs.second[places]
-        # A wide margin is expensive for meshes.
-        far = np.where(self._depth[first] + self._depth[second] > 0.0, margin, FARTHER * margin)
-        shown = far + self._taken_off[first] + self._taken_off[second]
-        n, now, rotation = world.num_bodies, run.state.now, run.state.rotation.copy()
-        # In the middle of a step bodies are elsewhere than at its start.
-        now = now._replace(position=now.position.copy(), orientation=now.orientation.copy())
-        mine = self.bodies.part[:n] != OUTSIDE
-        at = self.order[mine]
-        now.position[at], now.orientation[at] = self.bodies.position[:n][mine], self.bodies.orientation[:n][mine]
-        rotation[at] = self.bodies.rotation[:n][mine]
-        shares = np.array_split(np.arange(len(places)), self._shares if len(places) > self._sharing.general_pairs else 1)
-        while len(self._more_buffers) < len(shares) - 1:
+        table, world, count = self.table, self.world, len(places)
+        if count > len(self._asked.a):
+            self._asked = make_asked(2 * count, world.num_bodies)
+        asked, smaller = self._asked, self._smaller
+        ask_general(smaller, self._taken_off, self.bodies, table.pairs, places, margin, self.order, asked)
+        now = run.state.now._replace(position=asked.position, orientation=asked.orientation)
+        shares = self._shares if count > self._sharing.general_pairs else 1
+        edges = [count * share // shares for share in range(shares + 1)]
+        parts = [slice(begin, end) for begin, end in pairwise(edges)]
+        while len(self._more_buffers) < shares - 1:
             self._more_buffers.append(ContactBuffer(self._sharing.buffer))
-        buffers = [run.contact_buffer, *self._more_buffers][: len(shares)]
-        a, b = self.order[first], self.order[second]
+        buffers = [run.contact_buffer, *self._more_buffers][:shares]
         shapes = Shapes(self.geometry, world.shape_of_body)
-        questions = [Question(shapes, now, rotation, PairQuery(a[some], b[some], shown[some])) for some in shares]
-        found = find_together(buffers, questions)
-        smaller = SmallerShapes(world.geometry, self.geometry, self._factor, self._back, self._depth, self._convex, self._solids)
-        for some, buffer, count in zip(shares, buffers, found, strict=True):
+        questions = [
+            Question(shapes, now, asked.rotation, PairQuery(asked.a[part], asked.b[part], asked.shown[part])) for part in parts
+        ]  # fmt: skip
+        for part, buffer, found in zip(parts, buffers, find_together(buffers, questions), strict=True):
             # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
-            table.grow(count + POINTS * len(some) + 1)
+            table.grow(found + POINTS * (part.stop - part.start) + 1)
             store_contacts(
-                smaller, self.bodies, table.arrays, Searched(places[some], margin[some], far[some]), (buffer.real, buffer.integer), count,
-                self.order, world.coefficients,
+                smaller, self.bodies, table.arrays, Searched(places[part], margin[part], asked.far[part]), (buffer.real, buffer.integer),
+                found, self.order, world.coefficients,
             )  # fmt: skip
 
     def inside_others(self, run: Run, asked: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ class Sharing:
 
     Attributes:
         most_cores: that work at once. simd: width of the vectors.
-        pairs, general_pairs: beyond which several cores look at them: some tens of microseconds are lost by it.
+        pairs, general_pairs: beyond which several cores look at them: some hundreds of microseconds are lost by it.
         batches: each counted in every sub-step, beyond which several cores solve them. solvers: how many of them at most.
         first_points, points_of_a_body: see `ContactTable`. patches_of_a_body: patches that are reserved for each body.
         buffer: contacts that a buffer of general pairs holds at first.
@@ -33,7 +33,7 @@ class Sharing:
     most_cores: int = field(default_factory=number_of_cores)
     simd: Simd = field(default_factory=machine_simd)
     pairs: int = 400
-    general_pairs: int = 16
+    general_pairs: int = 40
     batches: int = 2000
     solvers: int = 2
     first_points: int = FIRST_POINTS
