@@ -113,7 +113,8 @@ def _simulate(
     listening: Listening,
 ) -> SimulatedRecording:
     """See `simulate`; listening: to Ctrl-C, or not."""
-    stopwatch, duration, times = Stopwatch(), float(asked.duration), frame_times(asked.duration, asked.fps)
+    stopwatch, times = Stopwatch(), frame_times(asked.duration, asked.fps)
+    duration = float(asked.duration)
     with memory_told(len(times), len(asked.scene.bodies)):
         if asked.from_frame is not None:
             recording = _go_on(asked, progress, cache, listening)

@@ -62,10 +62,6 @@ def compile_joints(joints: list[Joint], world: World) -> Joints:
         sides = [_side(joint, world, name) for name in (joint.a, joint.b)]
         if sides[0][0] == sides[1][0]:
             raise SceneError(f"it joins {joint.a!r} to itself", "name two different bodies", joint.label)
-        if not joint.break_force > 0.0:
-            raise SceneError(f"break_force = {joint.break_force}", "give a force in N, > 0, or leave it out", joint.label)
-        if not joint.release_time >= 0.0:
-            raise SceneError(f"release_time = {joint.release_time}", "give a time in s, >= 0, or leave it out", joint.label)
         if joint.name is not None and sum(other.name == joint.name for other in joints) > 1:
             raise SceneError(f"another joint has the name {joint.name!r}, too", "give each joint a name of its own", joint.label)
         motor = getattr(joint, "motor", None)
@@ -74,6 +70,7 @@ def compile_joints(joints: list[Joint], world: World) -> Joints:
         if not any(i >= 0 and world.dynamic[i] for i, _, _ in sides):
             raise SceneError("neither body is dynamic", "join at least one that moves", joint.label)
         try:
+            joint.check()
             anchor_a, anchor_b, axis = joint.points(world)
             frames = joint.frames(axis)
             rows = _soften(joint, joint.rows(float(length(anchor_b - anchor_a))))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from rigidimpulse.core.errors import SceneError, unknown_name
 
@@ -56,6 +56,14 @@ class Accuracy(BaseModel):
     step: float = Field(default=1.0 / 60.0, gt=0.0, allow_inf_nan=False)
     tolerance: float = Field(default=1e-13, gt=0.0, le=1e-2, allow_inf_nan=False)
     iterations: int = Field(default=10_000, ge=1)
+
+    @field_validator("penalty_stiffness", "penalty_damping", "substep_motion", "step", "tolerance", "iterations", mode="before")
+    @classmethod
+    def _is_no_text(cls, value: object) -> object:
+        """Refuse digits in text, which pydantic reads."""
+        if isinstance(value, str | bytes):
+            raise ValueError("give a number")
+        return value
 
     @model_validator(mode="after")
     def _fit_each_other(self) -> Accuracy:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.numeric import number_of, numbers_of
 from rigidimpulse.scene.collision_filter import CollisionFilter
 from rigidimpulse.scene.keyframes import Keyframes
 from rigidimpulse.scene.material import Material
@@ -114,7 +115,7 @@ class Body:
             raise SceneError(f"collision_filter is a {type(self.collision_filter).__name__}", "give a CollisionFilter")
         if not isinstance(self.visual, Visual | None):
             raise SceneError(f"visual is a {type(self.visual).__name__}", 'give a Visual, such as Visual(color="#2f7fb8")')
-        if self.motion not in MOTIONS:
+        if not isinstance(self.motion, str) or self.motion not in MOTIONS:
             raise SceneError(f"motion is {self.motion!r}", f"give one of {', '.join(map(repr, MOTIONS))}")
         if self.keyframes is not None:
             if not isinstance(self.keyframes, Keyframes):
@@ -132,11 +133,7 @@ class Body:
     def _check_state(self) -> None:
         """Check pose, velocities and gravity factor."""
         vector(self.position, "position", "m")
-        try:
-            quaternion = np.asarray(self.orientation, dtype=np.float64)
-        except (TypeError, ValueError):
-            quaternion = np.array(np.nan)
-        check_orientation(quaternion)
+        check_orientation(numbers_of(self.orientation))
         moving = [
             f"{name} is {value.tolist()}"
             for name, value in (
@@ -158,20 +155,14 @@ class Body:
         if self.center_of_mass is not None:
             vector(self.center_of_mass, "center_of_mass", "m")
         if self.inertia is not None:
-            try:
-                inertia = np.asarray(self.inertia, dtype=np.float64)
-            except (TypeError, ValueError):
-                inertia = np.array(np.nan)
+            inertia = numbers_of(self.inertia)
             if inertia.shape not in ((3,), (3, 3)) or not np.all(np.isfinite(inertia)):
                 raise SceneError(f"inertia is {self.inertia!r}", "give finite numbers (3,) or (3, 3), in kg m^2")
 
 
 def vector(value: ArrayLike, name: str, unit: str) -> np.ndarray:
     """Return a value as a finite vector (3,), or raise a `SceneError`."""
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        array = np.array(np.nan)
+    array = numbers_of(value)
     if array.shape != (3,) or not np.all(np.isfinite(array)):
         raise SceneError(f"{name} is {value!r}", f"give three finite numbers, in {unit}")
     return array
@@ -179,10 +170,7 @@ def vector(value: ArrayLike, name: str, unit: str) -> np.ndarray:
 
 def number(value: float, name: str, unit: str) -> float:
     """Return a value as a finite number, or raise a `SceneError`."""
-    try:
-        result = float(value)
-    except (TypeError, ValueError):
-        result = np.nan
+    result = number_of(value)
     if not np.isfinite(result):
         raise SceneError(f"{name} is {value!r}", f"give a finite number{f', in {unit}' if unit else ''}")
     return result

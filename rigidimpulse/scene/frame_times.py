@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.numeric import number_of
 
 
 def frame_times(duration: float, fps: float) -> np.ndarray:
@@ -16,8 +17,9 @@ def frame_times(duration: float, fps: float) -> np.ndarray:
         SceneError: duration or fps is not a positive finite number.
 
     """
-    if not (math.isfinite(duration) and duration >= 0.0):
+    seconds, rate = number_of(duration), number_of(fps)
+    if not (math.isfinite(seconds) and seconds >= 0.0):
         raise SceneError(f"duration = {duration!r}", "give a finite time in seconds, >= 0")
-    if not (math.isfinite(fps) and fps > 0.0):
+    if not (math.isfinite(rate) and rate > 0.0):
         raise SceneError(f"fps = {fps!r}", "give a positive number of frames per second")
-    return np.arange(round(duration * fps) + 1) / fps
+    return np.arange(round(seconds * rate) + 1) / rate

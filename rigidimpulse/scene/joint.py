@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.numeric import check_numbers, number_of
 from rigidimpulse.core.portable import length
 from rigidimpulse.scene.body import vector
 from rigidimpulse.scene.effect import SceneEffect
@@ -80,6 +81,7 @@ class Motor:
 
     def rows(self, coordinate: int) -> list[Row]:
         """Return the row of the drive."""
+        check_numbers(self, "velocity", "target", "stiffness", "damping", "max_force")
         if not (self.stiffness > 0.0 or self.damping > 0.0):
             raise SceneError("the motor has neither stiffness nor damping", "give one of them, > 0", "motor")
         if self.mode not in ("force", "acceleration"):
@@ -92,12 +94,9 @@ def bounds(coordinate: int, lower: float | None, upper: float | None, stiffness:
     """Rows that keep a coordinate between lower and upper, hard or with the stiffness and damping of a soft row.
 
     Raises:
-        SceneError: lower is above upper, or one of them is no number.
+        SceneError: lower is above upper.
 
     """
-    for name, value in (("lower", lower), ("upper", upper)):
-        if value is not None and math.isnan(value):
-            raise SceneError(f"{name} = {value}", "give a number, or leave it out")
     if lower is not None and upper is not None and lower > upper:
         raise SceneError(f"lower = {lower} is above upper = {upper}", "exchange them")
     rows = []
@@ -135,6 +134,16 @@ class Joint(SceneEffect, ABC):
     release_time: float = math.inf
     collide: bool = False
     stage: ClassVar[str] = "constrain"
+
+    def check(self) -> None:
+        """Raise a `SceneError` for values that are not of their kind, and for what cannot end the joint."""
+        check_numbers(self, "damping", "break_force", "release_time", optional=("lower", "upper", "stiffness"))
+        if not isinstance(self.collide, bool | np.bool_):
+            raise SceneError(f"collide = {self.collide!r}", "give True or False")
+        if not self.break_force > 0.0:
+            raise SceneError(f"break_force = {self.break_force}", "give a force in N, > 0, or leave it out")
+        if not self.release_time >= 0.0:
+            raise SceneError(f"release_time = {self.release_time}", "give a time in s, >= 0, or leave it out")
 
     @abstractmethod
     def points(self, world: PlacedBodies) -> Anchors:
@@ -285,9 +294,10 @@ class DistanceJoint(Joint):
     def rows(self, distance: float) -> list[Row]:
         """See `Joint`."""
         limits = bounds(DISTANCE, self.lower, self.upper)
-        length = distance if self.length is None else float(self.length)
+        length = distance if self.length is None else number_of(self.length)
         if not (math.isfinite(length) and length > 0.0):
-            raise SceneError(f"length is {length} m", "give a length > 0, or two different anchors")
+            given = distance if self.length is None else self.length
+            raise SceneError(f"length is {given!r} m", "give a length > 0, or two different anchors")
         return limits if limits and self.length is None else [Row(DISTANCE, length), *limits]
 
 

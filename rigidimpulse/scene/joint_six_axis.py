@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.numeric import check_numbers, numbers_of
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.scene.body import vector
 from rigidimpulse.scene.joint import HARD, Anchors, Joint, Motor, PlacedBodies, Row, across, bounds
@@ -37,7 +38,7 @@ ORTHONORMAL = TOLERANCES.joint.orthonormal_axes
 def _axes(translation: str, rotation: str, owner: str) -> tuple[bool, tuple[int, ...]]:
     """Whether it is a translation, and its axes in order."""
     given = translation or rotation
-    if bool(translation) == bool(rotation) or len(set(given)) != len(given) or not set(given) <= set(AXES):
+    if not isinstance(given, str) or bool(translation) == bool(rotation) or len(set(given)) != len(given) or not set(given) <= set(AXES):
         raise SceneError(
             f"translation is {translation!r}, rotation is {rotation!r}", "give one of them, as some of the letters x, y, z", owner
         )
@@ -73,6 +74,7 @@ class Limit:
 
         """
         linear, axes = _axes(self.translation, self.rotation, "limit")
+        check_numbers(self, "damping", optional=("lower", "upper", "stiffness"))
         stiffness = 0.0 if self.stiffness is None else self.stiffness
         if not (0.0 <= stiffness < math.inf and 0.0 <= self.damping < math.inf):
             raise SceneError(f"stiffness {self.stiffness}, damping {self.damping}", "give finite values >= 0", "limit")
@@ -128,7 +130,7 @@ def _fixed(linear: bool, axes: Sequence[int]) -> list[int]:
 
 def _frame(axes: ArrayLike, name: str) -> np.ndarray:
     """Columns (3, 3) of the given directions of x, y, z (rows), made orthonormal to round-off."""
-    given = np.asarray(axes, float)
+    given = numbers_of(axes)
     if given.shape != (3, 3) or not np.abs(given @ given.T - np.eye(3)).max() <= ORTHONORMAL or np.linalg.det(given) < 0.0:
         raise SceneError(f"{name} is {axes!r}", "give the directions of x, y and z: three unit vectors, a right-handed frame")
     u, _, v = np.linalg.svd(given)
@@ -174,6 +176,10 @@ class SixAxisJoint(Joint):
         """See `Joint`."""
         if self.lower is not None or self.upper is not None:
             raise SceneError("lower and upper", "give them to a Limit of the axes they bound")
+        for name, kind in (("limits", Limit), ("drives", Drive)):
+            given = getattr(self, name)
+            if not isinstance(given, Sequence) or not all(isinstance(one, kind) for one in given):
+                raise SceneError(f"{name} = {given!r}", f"give a list of ri.{kind.__name__}")
         locked: dict[bool, set[int]] = {True: set(), False: set()}
         rows = []
         for limit in self.limits:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.numeric import numbers_of
 from rigidimpulse.scene.shape import normalized_quaternion
 
 
@@ -69,10 +70,7 @@ class Keyframes:
     @staticmethod
     def _array(name: str, value: ArrayLike, entry: tuple[int, ...]) -> np.ndarray:
         """Return a finite array (k, *entry), or raise a `SceneError`."""
-        try:
-            array = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError):
-            array = np.array(np.nan)
+        array = numbers_of(value)
         if array.ndim == 0 or array.shape[1:] != entry or not np.all(np.isfinite(array)):
             form = ", ".join(["k", *map(str, entry)]) if entry else "k,"
             raise SceneError(f"{name} are {value!r}", f"give finite numbers ({form})", "keyframes")

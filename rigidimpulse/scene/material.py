@@ -10,7 +10,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.numeric import number_of
 
 COMBINE_MODES = ("average", "minimum", "maximum", "multiply")
 """Ways to combine two coefficients, the first of two taking precedence."""
@@ -70,6 +73,8 @@ class Material:
         density = _number("density", self.density, "kg/m^3")
         if density is None or density <= 0.0:
             raise SceneError(f"density is {self.density} kg/m^3", "give a density > 0, or the body's mass=", "material")
+        if not isinstance(self.any_restitution, bool | np.bool_):
+            raise SceneError(f"any_restitution is {self.any_restitution!r}", "give True or False", "material")
         for name in ("restitution", "tangential_restitution"):
             value = _number(name, getattr(self, name))
             if value is not None and not 0.0 <= value <= 1.0 and not (self.any_restitution and name == "restitution"):
@@ -93,9 +98,10 @@ class Material:
                 "material",
             )
         for name in ("restitution_combine", "friction_combine"):
-            if getattr(self, name) not in COMBINE_MODES:
+            mode = getattr(self, name)
+            if not isinstance(mode, str) or mode not in COMBINE_MODES:
                 listing = ", ".join(repr(mode) for mode in COMBINE_MODES)
-                raise SceneError(f"{name} is {getattr(self, name)!r}", f"give one of {listing}", "material")
+                raise SceneError(f"{name} is {mode!r}", f"give one of {listing}", "material")
 
 
 def combine(material_a: Material, material_b: Material) -> tuple[float, float, float, float]:
@@ -144,10 +150,7 @@ def _number(name: str, value: object, unit: str = "") -> float | None:
     """Return a stated value as a finite float, None if it is not stated."""
     if value is None:
         return None
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        number = math.nan
+    number = number_of(value)
     if not math.isfinite(number):
         raise SceneError(f"{name} is {value!r}", f"give a finite number{' in ' + unit if unit else ''}", "material")
     return number
