@@ -175,28 +175,29 @@ class EventLog:
         least = (counts[:3] + counts[3:]).tolist()
         self.buffers = LogBuffers(_doubled(energy, least[0]), _doubled(stretches, least[1]), _doubled(impacts, least[2]), counts)
 
-    def _reserve(self, energy: int = 0, stretches: int = 0, impacts: int = 0) -> None:
+    def reserve(self, energy: int = 0, stretches: int = 0, impacts: int = 0) -> None:
+        """Make space for as many rows of each."""
         if not has_capacity.py_func(self.buffers, energy, stretches, impacts):
             self.grow()
 
     def account(self, time: float, cause: str, change: float) -> None:
         """Keep a change of mechanical energy [J] by one of the `CAUSES`; negative is dissipated."""
-        self._reserve(energy=1)
+        self.reserve(energy=1)
         log_energy(self.buffers, time, CAUSES.index(cause), change)
 
     def add_stretch(self, start: float, end: float, body: int, energy: float, work: float, by_joints: bool) -> None:
         """Keep a trajectory under contact forces from start to end [s], see `STRETCH_DTYPE`: energy at the start and work [J]."""
-        self._reserve(stretches=1)
+        self.reserve(stretches=1)
         log_stretch(self.buffers, start, end, body, energy, work, by_joints)
 
     def add_impacts(self, time: float, contacts: Contacts, position: np.ndarray, log: np.ndarray, count: int) -> None:
         """Keep the impacts that `write_impacts` describes."""
-        self._reserve(impacts=count)
+        self.reserve(impacts=count)
         log_impacts(self.buffers, time, contacts, position, log, count)
 
     def extend_impacts(self, rows: np.ndarray, change: np.ndarray) -> None:
         """Keep impacts (k, ROW_LENGTH) that are written already, and the changes of energy (k,) J by them."""
-        self._reserve(energy=len(rows), impacts=len(rows))
+        self.reserve(energy=len(rows), impacts=len(rows))
         buffers, counts, changed = self.buffers, self.buffers.counts, change != 0.0
         buffers.impacts[counts[2] : counts[2] + len(rows)] = rows
         energy = buffers.energy[counts[0] : counts[0] + np.count_nonzero(changed)]

@@ -41,7 +41,7 @@ from rigidimpulse.engine.exact.impacts import (
     resolve_impacts,
 )
 from rigidimpulse.engine.exact.step_size import ErrorEstimate, Forces, StepLimits, Turning, hold_turning, turns
-from rigidimpulse.engine.exact.trajectories import set_impact_margins, take_steady_load
+from rigidimpulse.engine.exact.trajectories import begin_steady_trajectory, set_impact_margins
 from rigidimpulse.engine.exact.velocity_projection import ProjectionScratch, project, project_alone
 from rigidimpulse.engine.pair_table import (
     MARGIN,
@@ -58,7 +58,6 @@ from rigidimpulse.engine.pair_table import (
     next_time,
     note_sweep,
     pairs_to_sweep,
-    renew_pairs,
     settle_pairs,
 )
 from rigidimpulse.engine.sleeping import stands_still
@@ -95,10 +94,9 @@ from rigidimpulse.recording.events import (
     LogBuffers,
     log_energy,
     log_impacts,
-    log_stretch,
 )
 from rigidimpulse.recording.events import has_capacity as has_log_capacity
-from rigidimpulse.recording.recorder import Frames, flush_frames
+from rigidimpulse.recording.recorder import Frames
 
 AT_END, AT_EVENT, NO_CAPACITY, SHORT_OF_PAIRS = np.arange(4)
 """How the loop ends: at the end of the step; before an event that Python looks after; before one for which there is no space; after one
@@ -780,26 +778,13 @@ def _begin_trajectories(loop, island, members, velocity):
 @jit_making_arrays
 def _begin_trajectory(loop, i, interval, wrench, rests):
     """Body i gets a new trajectory, from its present state, with a constant wrench (6,); interval: from when to the end of the step, s."""
-    motion, limiter, log, contact_log, time = loop.motion, loop.limiter, loop.log, loop.contact_log, interval[0]
-    constants = loop.bodies.constants
-    now, trajectory, one = motion.now, motion.trajectory, np.empty(1, np.int64)
-    one[0], total = i, 0.0
+    now, trajectory, time, total = loop.motion.now, loop.motion.trajectory, interval[0], 0.0
     for k in range(3):
         total += now.velocity[i, k] + now.angular_velocity[i, k]
     if not isfinite(total):
+        one = np.empty(1, np.int64)
+        one[0] = i
         pose_at(trajectory, i, time, now.position[i], now.orientation[i])
         report(loop.reports, NOT_FINITE, time, 0.0, one)
         rests = True
-    flush_frames(trajectory, i, time, limiter.correction[i], loop.written, loop.frames)
-    for k in range(6):
-        limiter.correction[i, k] = 0.0
-    close_contacts(contact_log, one, time)
-    end_energy, begun = limiter.end_energy[i], limiter.energy_at_start[i]
-    if end_energy == end_energy:
-        limiter.end_energy[i] = np.nan
-        log_stretch(log, trajectory.start[i], time, i, begun, end_energy - begun, False)
-    pressed = take_steady_load(motion, constants, i, time, wrench, rests)
-    limiter.under_contact[i] = pressed
-    if pressed:
-        limiter.energy_at_start[i] = mechanical_energy(now, constants, one)
-    renew_pairs(loop.bodies, loop.margins, loop.table, trajectory, i, interval)
+    begin_steady_trajectory(loop, i, interval, wrench, rests, False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import isfinite, isnan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,15 +11,35 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.energy import mechanical_energy
 from rigidimpulse.engine.pair_events import PairEvents
-from rigidimpulse.engine.pair_table import sweep_pair_again
+from rigidimpulse.engine.pair_table import SHORT, PairBodies, PairTable, pair_bodies, renew_pairs, sweep_pair_again
 from rigidimpulse.engine.run import Run
+from rigidimpulse.engine.touching import Motion
 from rigidimpulse.model.island import Island
+from rigidimpulse.model.state import EnergyLimiter
+from rigidimpulse.model.world import Margins
 from rigidimpulse.motion.trajectory import FIXED, FORCED, FREE, Load, take
+from rigidimpulse.recording.contact_log import ContactBuffers, close_contacts
+from rigidimpulse.recording.events import LogBuffers, log_stretch
+from rigidimpulse.recording.recorder import Frames, flush_frames
 
 HALF_KEPT = 0.55
 """Held contacts nearer than this part of the contact margin have half of their gap as impact margin."""
 LEAVING = TOLERANCES.events.leaving
 WHOLE = 1.0 - TOLERANCES.events.whole
+
+
+class Passage(NamedTuple):
+    """What changes where a body passes from one trajectory to the next."""
+
+    bodies: PairBodies
+    margins: Margins
+    motion: Motion
+    table: PairTable
+    limiter: EnergyLimiter
+    log: LogBuffers
+    contact_log: ContactBuffers
+    frames: Frames
+    written: np.ndarray  # (n,) frames of each body
 
 
 def begin_trajectories(run: Run, pair_events: PairEvents, island: Island) -> None:
@@ -30,22 +51,85 @@ def begin_trajectories(run: Run, pair_events: PairEvents, island: Island) -> Non
         members = island.members[run.forces.acts[island.members]]
         h = run.forces.fly(run, members, island.time, pair_events.end)
         pair_events.wake[members] = np.where(h < (pair_events.end - island.time) * WHOLE, island.time + h, np.inf)
-    state, now = run.state, run.state.now
-    trajectory = state.trajectory
-    for n, i in enumerate(island.members.tolist()):
-        if pair_events.inside[i] or (island.rests and trajectory.mode[i] == FIXED and not island.moved):
-            continue
-        if (
-            island.moved
-            or state.under_contact[i]
-            or (now.velocity[i] != island.velocity[n]).any()
-            or (now.angular_velocity[i] != island.angular_velocity[n]).any()
-            or run.wrench[i].any()
-            or island.free is not None
-        ):
+    members = island.members[_changed(run, island) & ~pair_events.inside[island.members]]
+    if _are_steady(run, members):
+        _begin_steady(run, pair_events, members, island.time, island.rests)
+    else:
+        for i in members.tolist():
             begin_trajectory(run, pair_events, i, island.time, (run.wrench[i], run.wrench_rate[i]), island.rests)
-            state.by_joints[i] = len(island.joints) > 0 and len(island.place) == 0
+    run.state.by_joints[members] = len(island.joints) > 0 and len(island.place) == 0
     set_margins(run, pair_events, island)
+
+
+def _changed(run: Run, island: Island) -> np.ndarray:
+    """Which members (k,) do not go on as they did."""
+    state, now, members = run.state, run.state.now, island.members
+    if island.moved or island.free is not None:
+        changed = np.ones(len(members), bool)
+    else:
+        changed = state.under_contact[members] | run.wrench[members].any(axis=1)
+        changed |= (now.velocity[members] != island.velocity).any(axis=1)
+        changed |= (now.angular_velocity[members] != island.angular_velocity).any(axis=1)
+    return changed & (state.trajectory.mode[members] != FIXED) if island.rests and not island.moved else changed
+
+
+def _are_steady(run: Run, members: np.ndarray) -> bool:
+    """Whether nothing that varies acts on the members, and all their velocities are numbers."""
+    if run.world.force_tables or run.wrench_rate[members].any():
+        return False
+    now = run.state.now
+    return bool(np.isfinite(now.velocity[members]).all() and np.isfinite(now.angular_velocity[members]).all())
+
+
+def _begin_steady(run: Run, pair_events: PairEvents, members: np.ndarray, time: float, rests: bool) -> None:
+    """New trajectories for members on which nothing that varies acts, as `begin_trajectory` makes them, in one kernel."""
+    state, world, done = run.state, run.world, 0
+    run.log.reserve(stretches=len(members))
+    while done < len(members):
+        passage = Passage(
+            pair_bodies(world), world.margins, run.motion, pair_events.table, state.limiter, run.log.buffers, run.contact_log.buffers,
+            run.recorder.frames, run.recorder.written,
+        )  # fmt: skip
+        done = begin_steady_trajectories(passage, members, done, (time, pair_events.end), run.wrench, rests, state.by_joints)
+        pair_events.add_missing_pairs(time)
+
+
+@jit
+def begin_steady_trajectories(passage, members, first, interval, wrench, rests, by_joints):
+    """Begin the trajectories of members (k,) from place `first` on, until one finds no space for a pair; returns the place behind it.
+
+    wrench (n, 6): held constant; by_joints (n,): of the trajectories that end. See `begin_steady_trajectory`.
+    """
+    for s in range(first, members.shape[0]):
+        i = members[s]
+        begin_steady_trajectory(passage, i, interval, wrench[i], rests, by_joints[i])
+        if passage.table.number[SHORT]:
+            return s + 1
+    return members.shape[0]
+
+
+@jit_making_arrays
+def begin_steady_trajectory(passage, i, interval, wrench, rests, by_joints):
+    """Body i, whose velocity is finite, goes on from its present state under its steady load and a constant wrench (6,).
+
+    passage: `Passage`, or a record that has its fields, with space for a stretch; interval: from when to the end of the step, s; by_joints:
+    whether joints alone held the body on the trajectory that ends.
+    """
+    motion, limiter, time, one = passage.motion, passage.limiter, interval[0], np.empty(1, np.int64)
+    trajectory, one[0] = motion.trajectory, i
+    flush_frames(trajectory, i, time, limiter.correction[i], passage.written, passage.frames)
+    for k in range(6):
+        limiter.correction[i, k] = 0.0
+    close_contacts(passage.contact_log, one, time)
+    end_energy, begun = limiter.end_energy[i], limiter.energy_at_start[i]
+    if end_energy == end_energy:
+        limiter.end_energy[i] = np.nan
+        log_stretch(passage.log, trajectory.start[i], time, i, begun, end_energy - begun, by_joints)
+    pressed = take_steady_load(motion, passage.bodies.constants, i, time, wrench, rests)
+    limiter.under_contact[i] = pressed
+    if pressed:
+        limiter.energy_at_start[i] = mechanical_energy(motion.now, passage.bodies.constants, one)
+    renew_pairs(passage.bodies, passage.margins, passage.table, trajectory, i, interval)
 
 
 def begin_trajectory(run: Run, pair_events: PairEvents, i: int, time: float, held: tuple[np.ndarray, np.ndarray], rests: bool) -> None:
