@@ -23,6 +23,11 @@ def number_of(value: object) -> float:
         return np.nan
 
 
+def is_number(value: object) -> bool:
+    """Whether a value is a number, if only one that stands for none."""
+    return isinstance(value, float | np.floating) or not math.isnan(number_of(value))
+
+
 def check_numbers(owner: object, *names: str, optional: tuple[str, ...] = ()) -> None:
     """Raise a SceneError where an attribute of these names is no number; one of the optional ones may be None."""
     given = [name for name in optional if getattr(owner, name) is not None]

@@ -36,7 +36,7 @@ from rigidimpulse.engine.exact.impacts import respond
 from rigidimpulse.engine.exact.joint_flights import WHOLE
 from rigidimpulse.engine.exact.joints import JointState
 from rigidimpulse.engine.exact.step_size import Forces, StepLimits, Turning, estimate_error, hold_turning, turns
-from rigidimpulse.engine.exact.trajectories import set_impact_margins
+from rigidimpulse.engine.exact.trajectories import set_impact_margins, take_steady_load
 from rigidimpulse.engine.islands import touching_islands
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.regime import TALL, island_roots, refusals, support_levels
@@ -189,6 +189,7 @@ def _move(run: Run) -> None:
     run.recorder.flush(state.trajectory, 1, 2.0, np.zeros(6))
     bring_all(state.trajectory, np.array([1]), 0.0, now, state.rotation, run.acceleration, run.angular_acceleration)
     take(state.trajectory, 1, 0.0, now, Load(*np.zeros((4, 3))), FREE)
+    take_steady_load(run.motion, world.constants, 1, 0.0, np.zeros(6), False)
     pair_events = PairEvents(run, 1.0 / 60.0)
     pair_events.find_pairs()
     pair_events.trajectory_changed(1, 0.0)

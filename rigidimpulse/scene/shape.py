@@ -6,7 +6,6 @@ be turned into numbers, or read from a file, is refused at once.
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +20,7 @@ from rigidimpulse.core.colors import bytes_of
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.files import load_mesh
 from rigidimpulse.core.mesh_colors import colors_of_trimesh, joined_colors
-from rigidimpulse.core.numeric import number_of, numbers_of
+from rigidimpulse.core.numeric import is_number, number_of, numbers_of
 from rigidimpulse.core.portable import dot, length, matmul
 from rigidimpulse.scene.solid import Solid, compute_solid
 from rigidimpulse.scene.surface import Surface, clean_surface
@@ -437,10 +436,9 @@ def _corners(shape: Shape) -> np.ndarray:
 
 def _number(name: str, value: object) -> float:
     """Return a value as a float, whatever it is; a `SceneError` if it is none."""
-    number = number_of(value)
-    if math.isnan(number):
+    if not is_number(value):
         raise SceneError(f"{name} is {value!r}", "give a number", "shape")
-    return number
+    return number_of(value)
 
 
 def _corner_colors(colors: ArrayLike, num_faces: int) -> np.ndarray:
@@ -460,7 +458,7 @@ def _corner_colors(colors: ArrayLike, num_faces: int) -> np.ndarray:
 def _array(name: str, value: ArrayLike) -> np.ndarray:
     """Return a read-only float copy of an array; a `SceneError` if it has none."""
     array = numbers_of(value)
-    if array.ndim == 0 and np.isnan(array):
+    if array.ndim == 0 and not is_number(value):
         raise SceneError(f"{name} is {value!r}", "give numbers in a regular array", "shape")
     array.setflags(write=False)
     return array
