@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
 
-KINDS = "fiubO"
-"""What numpy takes numbers from: floats, integers, truth values, and objects such as fractions."""
+KINDS = "fiub"
+"""What numpy has numbers of: floats, integers, truth values."""
 
 
 def number_of(value: object) -> float:
@@ -19,7 +19,7 @@ def number_of(value: object) -> float:
         return np.nan
     try:
         return float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return np.nan
 
 
@@ -40,6 +40,9 @@ def numbers_of(value: ArrayLike) -> np.ndarray:
     """Return a float copy of an array, in order of C; of one value that is not a number where it holds others, or has no one form."""
     try:
         given = np.asarray(value)
+        if given.dtype.kind == "O":
+            # Objects may be text, which numpy would read.
+            given = np.array([number_of(one) for one in given.ravel().tolist()]).reshape(given.shape)
         return np.array(given, np.float64, order="C") if given.dtype.kind in KINDS else np.array(np.nan)
     except (TypeError, ValueError):
         return np.array(np.nan)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -103,4 +104,14 @@ def test_numbers_of_all_kinds_are_numbers() -> None:
     assert [number_of(value) for value in (1, 1.0, one, np.int64(1), True, np.array(1.0))] == [1.0] * 6
     assert numbers_of([one, 1, 1.0]).tolist() == [1.0] * 3
     assert numbers_of(np.ones(3, np.float32)).dtype == np.float64
-    assert np.isnan(numbers_of([1.0, [2.0]])).all()  # type: ignore[list-item]
+    fractions: Any = [Fraction(1, 2), 1]
+    assert numbers_of(fractions).tolist() == [0.5, 1.0]
+
+
+def test_what_no_float_holds_is_none() -> None:
+    ragged: Any = [1.0, [2.0]]
+    assert np.isnan(number_of(10**400))
+    assert np.isnan(numbers_of(ragged)).all()
+    assert np.isnan(numbers_of(np.array(["1", 2.0], object))).tolist() == [True, False]
+    with pytest.raises(ri.SceneError, match="mass"):
+        compile_scene(two_boxes(mass=10**400))
