@@ -16,7 +16,7 @@ from rigidimpulse.engine.compile_scene import compile_scene
 NO_NUMBERS: tuple[Any, ...] = ("5", b"5", object(), 1 + 2j, ["1", "2", "3"], {"x": 1.0}, float("nan"))
 NAMES = {"name", "a", "b", "motion", "mode", "translation", "rotation", "restitution_combine", "friction_combine"}
 BOX = ri.Shape.box((1.0, 1.0, 1.0))
-JOINTS: dict[type[ri.Joint], dict[str, Any]] = {
+JOINTS: dict[Any, dict[str, Any]] = {
     ri.BallJoint: {"anchor": (1.0, 0.0, 0.0)},
     ri.HingeJoint: {"anchor": (1.0, 0.0, 0.0), "axis": (0.0, 0.0, 1.0)},
     ri.SliderJoint: {"anchor": (1.0, 0.0, 0.0), "axis": (0.0, 0.0, 1.0)},
@@ -57,7 +57,7 @@ def test_a_material_is_refused(name: str, value: Any) -> None:
 
 @pytest.mark.parametrize("value", NO_NUMBERS, ids=lambda value: type(value).__name__)
 @pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind in JOINTS for name in parameters_of(kind)])
-def test_a_joint_is_refused(kind: type[ri.Joint], name: str, value: Any) -> None:
+def test_a_joint_is_refused(kind: Any, name: str, value: Any) -> None:
     arguments = {**JOINTS[kind], name: value}
     with pytest.raises(ri.SceneError, match=kind.__name__):
         compile_scene(two_boxes(kind("a", "b", **arguments)))
@@ -100,7 +100,7 @@ def test_text_is_no_setting(name: str) -> None:
 
 
 def test_numbers_of_all_kinds_are_numbers() -> None:
-    one = np.float32(1.0)
+    one: Any = np.float32(1.0)
     assert [number_of(value) for value in (1, 1.0, one, np.int64(1), True, np.array(1.0))] == [1.0] * 6
     assert numbers_of([one, 1, 1.0]).tolist() == [1.0] * 3
     assert numbers_of(np.ones(3, np.float32)).dtype == np.float64
