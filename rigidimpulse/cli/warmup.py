@@ -19,7 +19,8 @@ def warmup(processes: int | None) -> None:
 
     from rigidimpulse.core.errors import SceneError
     from rigidimpulse.core.kernel_cache import is_kept
-    from rigidimpulse.engine.warm_up_all import compile_parts, missing_parts, most_processes, seconds_for
+    from rigidimpulse.engine.warm_up import most_processes
+    from rigidimpulse.engine.warm_up_all import compile_parts, missing_parts, seconds_for
 
     if not is_kept():
         raise SceneError("there is no folder to keep kernels in", "name one that can be written in the variable NUMBA_CACHE_DIR")

@@ -8,6 +8,7 @@ bound of numba's version, and `tests/unit/test_numba_private.py` says which line
 | option `_nrt` | kernels that do not count who holds an array | narrow phases take twice as long |
 | `_NoArraysMade` | refuses such a kernel where it would have to count | memory that is never freed |
 | `_PartLibrary`, `_EntryLibrary` | kernels that only kernels call are optimised once, in what Python calls | LLVM takes more of the time |
+| `_Lower` | what a kernel is given is its caller's: nobody counts who holds it in kernels that make arrays, either | three times the code |
 | `_RememberedTypes`, `_KernelFlags` | the types of `a + b` and the flags of kernels are looked up but once | more of it goes to types |
 | `AttributeTemplate` | types of the fields of records (`record.py`); `infer_getattr`, which is public, asks for one | no records |
 | `create_struct_proxy` | a field of a record that is an array is known to be nobody's (`record.py`) | records do not run |
@@ -19,16 +20,20 @@ manual for developers ("Customizing the compiler"), as a thing for experts.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, ClassVar
 
 from llvmlite.binding import Linkage
 from numba import types
+from numba.core import ir
 from numba.core.cgutils import create_struct_proxy as create_struct_proxy
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import AnalysisPass, register_pass
 from numba.core.errors import NumbaError
-from numba.core.typed_passes import InlineOverloads, NopythonRewrites, NopythonTypeInference
+from numba.core.lowering import Lower
+from numba.core.typed_passes import BaseNativeLowering, InlineOverloads, NativeLowering, NopythonRewrites, NopythonTypeInference
 from numba.core.typing.templates import AttributeTemplate as AttributeTemplate
 from numba.core.untyped_passes import InlineClosureLikes, InlineInlinables, LiteralPropagationSubPipelinePass, LiteralUnroll, WithLifting
 
@@ -129,6 +134,110 @@ class _NoArraysMade(AnalysisPass):
         return False
 
 
+_PLACES = types.Integer, types.SliceType, types.EllipsisType, types.NoneType
+"""What an array is indexed with where the result is a view of it, and no new array."""
+
+
+class _Lower(Lower):
+    """Numba's way to LLVM, without counting who holds what a kernel is given, and the views and tuples that it makes of this.
+
+    The caller holds its arguments until it returns. Numba counts each array of each tuple up and down again at every use of it: in kernels
+    that make arrays this was three quarters of all code.
+    """
+
+    def lower_normal_function(self, fndesc: Any) -> None:
+        """Lower a kernel."""
+        self._given = self._held_by_caller() if self.context.enable_nrt else set()
+        super().lower_normal_function(fndesc)
+
+    def lower_assign(self, ty: Any, inst: Any) -> Any:
+        """Lower the value of an assignment."""
+        with self._counting(inst.target.name not in self._given):
+            return super().lower_assign(ty, inst)
+
+    def storevar(self, value: Any, name: str, argidx: int | None = None) -> None:
+        """Store a value in a variable."""
+        with self._counting(name not in self._given):
+            super().storevar(value, name, argidx)
+
+    def delvar(self, name: str) -> None:
+        """Let go what a variable holds."""
+        if self.context.enable_nrt and self._is_counted(name) and name not in self._given:
+            super().delvar(name)
+
+    @contextmanager
+    def _counting(self, is_on: bool) -> Iterator[None]:
+        """Let code that counts be made as before, or none."""
+        before = self.context.enable_nrt
+        self.context.enable_nrt = before and is_on
+        try:
+            yield
+        finally:
+            self.context.enable_nrt = before
+
+    def _held_by_caller(self) -> set[str]:
+        """Names of variables that never hold anything else than what the caller holds: of all variables, those without another value."""
+        values: dict[str, list[Any]] = {}
+        for block in self.blocks.values():
+            for assign in block.find_insts(ir.Assign):
+                values.setdefault(assign.target.name, []).append(assign)
+        given, others = {name for name in values if self._is_counted(name)}, {""}
+        while others:
+            others = {name for name in given if not all(self._is_given(assign, given) for assign in values[name])}
+            given -= others
+        return given
+
+    def _is_counted(self, name: str) -> bool:
+        """Whether values of a variable's type are counted at all."""
+        return bool(self.context.data_model_manager[self.typeof(name)].contains_nrt_meminfo())
+
+    def _is_given(self, assign: Any, given: set[str]) -> bool:
+        """Whether an assignment is of an argument, or a part or a view of such, if the variables named `given` are."""
+
+        def are_given(*read: Any) -> bool:
+            return all(variable.name in given or not self._is_counted(variable.name) for variable in read)
+
+        value = assign.value
+        if isinstance(value, (ir.Arg, ir.Const, ir.Global, ir.FreeVar)):
+            return True
+        if isinstance(value, ir.Var):
+            return are_given(value)
+        match value.op if isinstance(value, ir.Expr) else "":
+            case "getattr" | "exhaust_iter" | "getitem" | "static_getitem":
+                return are_given(value.value) and self._is_part(assign)
+            case "build_tuple":
+                return are_given(*value.items)
+            case "call":
+                makes_tuple = isinstance(self.typeof(value.func.name), types.NamedTupleClass)
+                return makes_tuple and not value.kws and value.vararg is None and are_given(*value.args)
+        return False
+
+    def _is_part(self, assign: Any) -> bool:
+        """Whether reading makes no array that was not there before: parts of tuples and records, rows and other views of arrays."""
+        value, source = assign.value, self.typeof(assign.value.value.name)
+        if not isinstance(source, types.Array):
+            return value.op != "exhaust_iter" or isinstance(source, types.BaseTuple)
+        if not isinstance(self.typeof(assign.target.name), types.Array) or value.op == "exhaust_iter":
+            return False
+        if value.op == "getattr":
+            return True
+        index = value.index if value.op == "getitem" else value.index_var
+        place = self.typeof(index.name) if index is not None else types.undefined
+        return all(isinstance(each, _PLACES) for each in (place.types if isinstance(place, types.BaseTuple) else (place,)))
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Lowering(BaseNativeLowering):
+    """The pass that does it."""
+
+    _name = "lower_uncounted"
+
+    @property
+    def lowering_class(self) -> type[Lower]:
+        """What makes LLVM's code."""
+        return _Lower
+
+
 class _RememberedTypes:
     """Numba's typing context for one kernel; what `+` or `x[i, k]` makes of the same types is looked up but once.
 
@@ -188,7 +297,7 @@ class KernelCompiler(Compiler):
         """Return the passes."""
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.add_pass_after(_NoArraysMade, NopythonTypeInference)
-        passes.passes[:] = [(kind, name) for kind, name in passes.passes if kind not in _NEEDLESS]
+        passes.passes[:] = [(_Lowering if kind is NativeLowering else kind, name) for kind, name in passes.passes if kind not in _NEEDLESS]
         passes.finalize()
         return [passes]
 

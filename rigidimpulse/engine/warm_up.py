@@ -1,8 +1,8 @@
 """The first run on a machine: compile kernels on all cores.
 
 Numba compiles one kernel at a time in a process. So the kernels of each kind that a run needs and that are not in the cache on disk are
-compiled in parts (`warm_up_parts.py`): the first in this process, each of the others in one of its own, which puts them into the cache.
-Parts of one kind take about as long, and share little that would be compiled twice.
+compiled in parts (`warm_up_parts.py`), by this process and by others, on all cores. Each of them takes one part after the other
+that nobody has taken: kernels are made of smaller ones, and what a process has compiled for one part need not be compiled for its next.
 
 The order of events of exact contact (`exact/event_loop.py`) takes about a minute to compile, and runs without it give the same bits. So
 nobody waits for it: a process of its own compiles it beside the first runs and after them, and puts it into the cache.
@@ -12,21 +12,23 @@ Nothing is compiled twice where two first runs begin at once: the second waits f
 
 from __future__ import annotations
 
-import gc
 import logging
+import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 
 from rigidimpulse.collision.manifold.shrunk_shapes import convex_polyhedra, several_polyhedra
 from rigidimpulse.core.claim import claim
-from rigidimpulse.core.kernel_cache import is_kept, note_beside, variables_to_share_kernels
+from rigidimpulse.core.kernel_cache import is_kept, note_beside, source_digest, variables_to_share_kernels
 from rigidimpulse.core.kernels import Kernel, is_cached
 from rigidimpulse.model.world import World
 
@@ -48,11 +50,38 @@ LAST = {
 _BACKGROUND: list[subprocess.Popen] = []
 """Processes that nobody waits for."""
 PARTS_MODULE = "rigidimpulse.engine.warm_up_parts"
-SECONDS = {CONTACTS: 60, EVENTS: 20, SUBSTEPPED: 35, JOINTS: 40, STEPPED_JOINTS: 40, ANY_SHAPES: 30, UNDER_FORCES: 15}
+SECONDS = {CONTACTS: 60, EVENTS: 20, SUBSTEPPED: 35, JOINTS: 40, STEPPED_JOINTS: 40, ANY_SHAPES: 30, UNDER_FORCES: 15, LOOP: 70}
 """s that compiling each kind takes, about, on two threads of one core."""
 LONGEST_WAIT, LOOK_AGAIN = 10.0, 0.2
 """How many times as long as compiling takes a process waits for another one that compiles; s, how often it looks whether that has ended."""
-NUMBER_OF_PARTS = {CONTACTS: 2, EVENTS: 1, SUBSTEPPED: 2, JOINTS: 4, STEPPED_JOINTS: 1, ANY_SHAPES: 1, UNDER_FORCES: 1}
+NUMBER_OF_PARTS = {CONTACTS: 3, EVENTS: 1, SUBSTEPPED: 2, JOINTS: 4, STEPPED_JOINTS: 1, ANY_SHAPES: 1, UNDER_FORCES: 1, LOOP: 1}
+
+
+@dataclass(frozen=True)
+class KernelPart:
+    """What is compiled at once: a kind, and the number of its part."""
+
+    kind: str
+    number: int = 0
+
+    @property
+    def seconds(self) -> float:
+        """How long that takes, s, about."""
+        return SECONDS[self.kind] / NUMBER_OF_PARTS[self.kind]
+
+    def __str__(self) -> str:
+        """Return its kind and number."""
+        return f"{self.kind} {self.number}"
+
+    def note(self) -> Path:
+        """The file that says that it is compiled."""
+        words = [source_digest(Path(__file__).with_name("warm_up_parts.py")), self.kind, str(self.number)]
+        return note_beside(prepare_kernels, "-".join(words).replace(" ", "_"))
+
+    def claim(self) -> IO[bytes] | None:
+        """Claim it, to compile it; None where another process compiles it."""
+        note = self.note()
+        return claim(note.with_name(f"{note.name}.lock"))
 
 
 def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> None:
@@ -114,44 +143,37 @@ def _last_kernel(kind: str) -> Any:
     return getattr(import_module(f"rigidimpulse.{module}"), name)
 
 
+def parts_of(kinds: Sequence[str]) -> list[KernelPart]:
+    """The parts of these kinds."""
+    return [KernelPart(kind, number) for kind in kinds for number in range(NUMBER_OF_PARTS[kind])]
+
+
 def compile_kernels(kinds: list[str]) -> None:
-    """Compile kernels of these kinds. Should another process fail, its part is compiled when used."""
-    mine, *others = [(kind, part) for kind in kinds for part in range(NUMBER_OF_PARTS[kind])]
-    with ExitStack() as processes:
-        for kind, part in others:
-            processes.enter_context(start_process(kind, str(part)))
-        with _without_garbage_collection():
-            import_module(PARTS_MODULE).compile_part(*mine)
+    """Compile kernels of these kinds. Should a part fail, or no file be made, they are compiled when used."""
+    parts = parts_of(kinds)
+    with ExitStack() as processes, suppress(OSError):
+        for _ in range(min(most_processes(), len(parts)) - 1):
+            processes.enter_context(start_process(parts))
+        import_module(PARTS_MODULE).compile_in_turn(parts)
 
 
 def compile_loop_in_background() -> None:
     """Start a process that compiles the order of events, unless one does; it goes on by itself."""
-    if (held := claim_loop()) is not None:
+    part = KernelPart(LOOP)
+    if (held := part.claim()) is not None:
         # The process takes the claim itself: this one may end before.
         held.close()
-        _BACKGROUND.append(start_process(LOOP, "0"))
+        _BACKGROUND.append(start_process([part]))
 
 
-def claim_loop() -> IO[bytes] | None:
-    """Claim the order of events, to compile it; None where another process compiles it."""
-    return claim(note_beside(prepare_kernels, "loop.lock"))
-
-
-def start_process(*arguments: str, errors: IO[bytes] | None = None) -> subprocess.Popen:
-    """Start a process that compiles one part; what it says of errors goes to a file, or nowhere."""
+def start_process(parts: Sequence[KernelPart], errors: IO[bytes] | None = None) -> subprocess.Popen:
+    """Start a process that compiles those of some parts that no other does; what it says of errors goes to a file, or nowhere."""
     quiet = subprocess.DEVNULL
-    command = [sys.executable, "-m", PARTS_MODULE, *arguments]
+    command = [sys.executable, "-m", PARTS_MODULE, *(word for part in parts for word in (part.kind, str(part.number)))]
     variables = variables_to_share_kernels()
     return subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet if errors is None else errors, env=variables)
 
 
-@contextmanager
-def _without_garbage_collection() -> Iterator[None]:
-    """Compilers make many objects and hardly any garbage: looking for it takes a seventh of their time."""
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
+def most_processes() -> int:
+    """How many processes may compile at a time: on all cores that this one has."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

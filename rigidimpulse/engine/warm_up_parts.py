@@ -1,13 +1,16 @@
-"""Kernels of each kind that are compiled ahead, in parts of about equal time that share little; see `warm_up.py`.
+"""Kernels of each kind that are compiled ahead, in parts; see `warm_up.py`.
 
-As a program it compiles one part, in a process of its own: `python -m rigidimpulse.engine.warm_up_parts KIND PART`.
+As a program it compiles parts, in a process of its own: `python -m rigidimpulse.engine.warm_up_parts KIND NUMBER [KIND NUMBER ...]`.
 """
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -57,7 +60,7 @@ from rigidimpulse.engine.warm_up import (
     STEPPED_JOINTS,
     SUBSTEPPED,
     UNDER_FORCES,
-    claim_loop,
+    KernelPart,
 )
 from rigidimpulse.model.contact_memory import grown, keep_wrenches, make_memory
 from rigidimpulse.model.contacts import Contacts, Touching
@@ -72,6 +75,8 @@ from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 
 STEP = 1.0 / 60.0
+RARELY = 100_000
+"""Objects between two looks for garbage."""
 
 
 def _run_of(scene: Scene) -> Run:
@@ -100,8 +105,8 @@ def _contact() -> Contacts:
     return contacts
 
 
-def _respond_and_detect(run: Run) -> None:
-    """Impulses first: by then the other process has rows and what moves bodies in the cache, which these need too."""
+def _hold(run: Run) -> None:
+    """Lasting contacts."""
     state, world, now, one, contacts = run.state, run.world, run.state.now, np.ones(1), _contact()
     members = np.array([1])
     problem, turning = _held(run, contacts)
@@ -121,17 +126,20 @@ def _respond_and_detect(run: Run) -> None:
     note_end_energy(state.limiter, now, world.constants, members)
     limit_energy(state.limiter, now, world.constants, state.trajectory, members, 0.0, which, np.empty(1))
     stands_still(problem, world.constants, contacts, run.wrench, 1.0)
+
+
+def _respond_and_detect(run: Run) -> None:
+    """Impulses, and what the steps of a body that falls and rests call besides."""
     start_trajectories(run)
     pair_events = PairEvents(run, 1.0 / 60.0)
     pair_events.find_pairs()
-    islands, _ = touching_islands(run, pair_events, 0.0, members)
+    islands, _ = touching_islands(run, pair_events, 0.0, np.array([1]))
     island = islands[0]
     respond(run, pair_events, island)
     pair_events.bodies_at(0.0)
     pair_events.count_contacts(0.0)
-    # What is left is what the steps of a body that falls and rests call.
     _take_steps(run)
-    points_inside(world.geometry, 1, np.zeros((1, 3)))
+    points_inside(run.world.geometry, 1, np.zeros((1, 3)))
 
 
 def _held(run: Run, contacts: Contacts) -> tuple[ContactProblem, Turning]:
@@ -317,9 +325,7 @@ def _fly_balls(_run: Run) -> None:
 
 
 def _go_from_event_to_event(run: Run) -> None:
-    """The compiled order of events, at low priority: nobody waits for it."""
-    if hasattr(os, "nice"):
-        os.nice(10)
+    """The compiled order of events."""
     start_trajectories(run)
     loop, pair_events = CompiledLoop(run), PairEvents(run, STEP)
     pair_events.find_pairs()
@@ -328,7 +334,7 @@ def _go_from_event_to_event(run: Run) -> None:
 
 
 PARTS = {
-    CONTACTS: (_respond_and_detect, _move_and_sweep),
+    CONTACTS: (_respond_and_detect, _hold, _move_and_sweep),
     EVENTS: (_fly_balls,),
     SUBSTEPPED: (_find_substepped_contacts, _step_substepped),
     JOINTS: (_start_joints, _close_and_stop_joints, _fly_on_joints, _touch_with_joints),
@@ -345,15 +351,70 @@ def compile_part(kind: str, part: int) -> None:
     PARTS[kind][part](_on_floor(kind))
 
 
-def compile_alone(kind: str, part: int) -> None:
-    """The same in a process of its own. Where another one compiles the order of events, this one waits, and finds it in the cache."""
-    held = None
-    while kind == LOOP and (held := claim_loop()) is None:
-        time.sleep(LOOK_AGAIN)
-    compile_part(kind, part)
-    if held is not None:
-        held.close()
+def compile_in_turn(parts: Sequence[KernelPart]) -> list[str]:
+    """Compile parts that no other process compiles, one after the other, then wait for those that others do.
+
+    A part that another process leaves undone is compiled here. What could not be compiled is returned in words, with the part first.
+
+    Raises:
+        OSError: no file can be made to claim a part with.
+
+    """
+    left, failed = list(parts), []
+    while left:
+        taken = 0
+        for part in tuple(left):
+            with _claimed(part) as is_mine:
+                if is_mine:
+                    failed += _compiled(part)
+                    left.remove(part)
+                    taken += 1
+        if left and not taken:
+            time.sleep(LOOK_AGAIN)
+    return failed
+
+
+@contextmanager
+def _claimed(part: KernelPart) -> Iterator[bool]:
+    """Claim a part; gives whether that worked."""
+    held = part.claim()
+    try:
+        yield held is not None
+    finally:
+        if held is not None:
+            held.close()
+
+
+def _compiled(part: KernelPart) -> list[str]:
+    """Compile a part, unless that was done; returns what went wrong."""
+    if part.note().exists():
+        return []
+    try:
+        with _with_rare_garbage_collection():
+            compile_part(part.kind, part.number)
+    except Exception as error:
+        return [f"{part}: {type(error).__name__}: {error}"]
+    part.note().touch()
+    return []
+
+
+@contextmanager
+def _with_rare_garbage_collection() -> Iterator[None]:
+    """Compilers make many objects and hardly any garbage: looking for it as often as usual takes a sixth of their time.
+
+    Without looking at all, a process needs 1.5 GB where 0.7 GB are enough.
+    """
+    usual = gc.get_threshold()
+    gc.set_threshold(RARELY, *usual[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*usual)
 
 
 if __name__ == "__main__":
-    compile_alone(sys.argv[1], int(sys.argv[2]))
+    asked = [KernelPart(kind, int(number)) for kind, number in zip(sys.argv[1::2], sys.argv[2::2], strict=True)]
+    if asked == [KernelPart(LOOP)] and hasattr(os, "nice"):
+        os.nice(10)  # Nobody waits for it.
+    for line in compile_in_turn(asked):
+        sys.stderr.write(f"{line}\n")
