@@ -223,7 +223,7 @@ class _Lower(Lower):
             return True
         index = value.index if value.op == "getitem" else value.index_var
         place = self.typeof(index.name) if index is not None else types.undefined
-        return all(isinstance(each, _PLACES) for each in (place.types if isinstance(place, types.BaseTuple) else (place,)))
+        return all(isinstance(each, _PLACES) for each in getattr(place, "types", (place,)))
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
