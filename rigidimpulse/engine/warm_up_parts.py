@@ -55,6 +55,7 @@ from rigidimpulse.engine.warm_up import (
     CONTACTS,
     EVENTS,
     JOINTS,
+    LONGEST_WAIT,
     LOOK_AGAIN,
     LOOP,
     STEPPED_JOINTS,
@@ -351,25 +352,27 @@ def compile_part(kind: str, part: int) -> None:
     PARTS[kind][part](_on_floor(kind))
 
 
-def compile_in_turn(parts: Sequence[KernelPart]) -> list[str]:
+def compile_in_turn(parts: Sequence[KernelPart], patience: float = LONGEST_WAIT) -> list[str]:
     """Compile parts that no other process compiles, one after the other, then wait for those that others do.
 
-    A part that another process leaves undone is compiled here. What could not be compiled is returned in words, with the part first.
+    A part that another process leaves undone is compiled here, and so is one that is not done in `patience` times the seconds that it
+    takes. What could not be compiled is returned in words, with the part first.
 
     Raises:
         OSError: no file can be made to claim a part with.
 
     """
-    left, failed = list(parts), []
+    left, failed, idle_since = list(parts), [], time.monotonic()
     while left:
-        taken = 0
+        number = len(left)
         for part in tuple(left):
+            is_late = time.monotonic() - idle_since > patience * part.seconds
             with _claimed(part) as is_mine:
-                if is_mine:
+                if is_mine or is_late:
                     failed += _compiled(part)
                     left.remove(part)
-                    taken += 1
-        if left and not taken:
+                    idle_since = time.monotonic()
+        if len(left) == number:
             time.sleep(LOOK_AGAIN)
     return failed
 

@@ -14,7 +14,9 @@ import pytest
 from click.testing import CliRunner
 
 from rigidimpulse.cli.cli import BAD_SCENE, main
-from rigidimpulse.engine.warm_up_all import ALL_PARTS, KernelPart, compile_parts, missing_parts
+from rigidimpulse.engine.warm_up import KernelPart
+from rigidimpulse.engine.warm_up_all import ALL_PARTS, compile_parts, missing_parts
+from rigidimpulse.engine.warm_up_parts import compile_in_turn
 
 
 @pytest.fixture
@@ -56,6 +58,41 @@ def test_parts_that_lie_in_the_cache_are_loaded_and_noted():
     part.note().unlink(missing_ok=True)
     assert compile_parts([part], 1, lambda done: None) == []
     assert part.note().exists() and part not in missing_parts()
+
+
+HOLDS = """
+import sys, time
+from rigidimpulse.engine.warm_up import KernelPart
+held = KernelPart("contacts", 7).claim()
+print(held is not None, flush=True)
+time.sleep(float(sys.argv[1]))
+"""
+
+
+def test_a_part_that_another_process_leaves_undone_is_compiled_here(empty_cache):
+    """The other one ends without a note, as where the system kills it. There is no such part: that it is tried shows by its failure."""
+    with subprocess.Popen([sys.executable, "-c", HOLDS, "2.0"], stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout is not None and other.stdout.readline() == "True\n"
+        begin = time.monotonic()
+        (failed,) = compile_in_turn([KernelPart("contacts", 7)])
+    assert failed.startswith("contacts 7: IndexError")
+    assert time.monotonic() - begin > 1.0
+
+
+def test_a_process_that_hangs_is_not_waited_for_without_end(empty_cache):
+    with subprocess.Popen([sys.executable, "-c", HOLDS, "600"], stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout is not None and other.stdout.readline() == "True\n"
+        (failed,) = compile_in_turn([KernelPart("contacts", 7)], patience=0.01)
+        assert other.poll() is None
+        other.kill()
+    assert failed.startswith("contacts 7: IndexError")
+
+
+def test_what_another_process_has_compiled_is_left_out(empty_cache):
+    """Were it compiled, it would fail."""
+    part = KernelPart("contacts", 7)
+    part.note().touch()
+    assert compile_in_turn([part]) == []
 
 
 def test_control_c_ends_it_and_all_its_processes(empty_cache):
