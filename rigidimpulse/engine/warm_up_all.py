@@ -84,9 +84,10 @@ def compile_parts(parts: Sequence[KernelPart], processes: int, progress: Callabl
 
 
 def _reason(part: KernelPart, lines: list[str], codes: list[int]) -> str:
-    """Why a part is not compiled: what was said of it, or the last line that was said at all, or how processes ended."""
+    """Why a part is not compiled: what was said of it, or the last line that is of no part, or how processes ended."""
     of_part = [line.removeprefix(f"{part}: ") for line in lines if line.startswith(f"{part}: ")]
-    return next(iter([*of_part, *lines[-1:], f"processes ended with {', '.join(map(str, codes))}"]))
+    of_none = [line for line in lines if not any(line.startswith(f"{each}: ") for each in ALL_PARTS)]
+    return next(iter([*of_part, *of_none[-1:], f"processes ended with {', '.join(map(str, codes))}"]))
 
 
 class _Estimate:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from functools import partial
 
 import numba
@@ -51,6 +52,18 @@ def test_a_part_that_is_compiled_is_not_missing_any_more(empty_cache):
     assert failed.part == wrong and "IndexError" in failed.reason
     assert not wrong.note().exists()
     assert 0.0 <= told[0] <= 1.0 and told[-1] == 1.0 and told == sorted(told)
+
+
+def test_a_process_that_is_killed_is_told_as_such(empty_cache):
+    before = set(processes_below(os.getpid()))
+
+    def kill_new(_done: float) -> None:
+        for child in set(processes_below(os.getpid())) - before:
+            with suppress(ProcessLookupError):
+                os.kill(child, signal.SIGKILL)
+
+    (failed,) = compile_parts([ALL_PARTS[0]], 1, kill_new)
+    assert failed.part == ALL_PARTS[0] and failed.reason == "processes ended with -9"
 
 
 def test_parts_that_lie_in_the_cache_are_loaded_and_noted():
