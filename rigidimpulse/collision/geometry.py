@@ -45,7 +45,7 @@ _POINT_OWNS = 0b000001  # a sphere's triangle (v, v, v) owns its vertex
 _SEGMENT_OWNS = 0b001011  # a capsule's triangle (a, b, b) owns both vertices and edge 0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Primitive:
     """One convex or triangulated piece of a shape, in the principal frame of its body.
 
@@ -65,7 +65,7 @@ class Primitive:
     faces: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CompiledShape:
     """The primitives of one shape, in the principal frame of the bodies that use it."""
 

@@ -25,6 +25,8 @@ MOST_CORES = 4
 """Cores on which a kernel is worth calling at once."""
 KERNELS: list[Kernel] = []
 """All kernels of the modules that have been imported."""
+CALLED: list[Kernel] = []
+"""Those that Python has called."""
 
 
 class Kernel:
@@ -50,7 +52,7 @@ class Kernel:
         self.name = f"{function.__module__.removeprefix('rigidimpulse.')}.{function.__name__}"
         self.calls, self.seconds, self.preparing = 0, 0.0, 0.0
         KERNELS.append(self)
-        self._makes_arrays = makes_arrays
+        self._makes_arrays, self._lies_in_cache = makes_arrays, False
         self.part = _njit(**options_of(PartCompiler, makes_arrays), **options)(function)
 
     @cached_property
@@ -67,11 +69,18 @@ class Kernel:
         result = entry(*arguments)
         spent = perf_counter() - start
         self.calls += 1
+        if self.calls == 1:
+            CALLED.append(self)
         if len(entry.overloads) == known:
             self.seconds += spent
         else:
             self.preparing += spent
         return result
+
+    def is_cached(self) -> bool:
+        """Whether the kernel of these sources is in use, or lies in the cache on disk, for whatever types."""
+        self._lies_in_cache = self._lies_in_cache or INTERPRETED or bool(self.entry.overloads) or is_in_cache(self.py_func)
+        return self._lies_in_cache
 
     def together(self, calls: Sequence[tuple]) -> list[Any]:
         """Call it from Python with each of these tuples of arguments at once, on as many cores; results in their order."""
@@ -134,8 +143,3 @@ def inlined(function: Callable[..., Any]) -> Any:
     A call passes a tuple of arrays word by word, which takes longer than many a kernel does. The bits stay the same.
     """
     return Kernel(function, makes_arrays=False, forceinline=True)
-
-
-def is_cached(kernel: Kernel) -> bool:
-    """Whether a kernel of these sources is in use, or lies in the cache on disk, for whatever types."""
-    return INTERPRETED or bool(kernel.entry.overloads) or is_in_cache(kernel.py_func)

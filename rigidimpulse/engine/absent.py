@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
+from rigidimpulse.engine.exact.step_begin import make_counts
 from rigidimpulse.engine.pair_table import NEVER
 from rigidimpulse.model.island import Island
 
@@ -122,7 +123,7 @@ class NoSubstepping:
 
     def __init__(self, num_bodies: int) -> None:
         """None of the bodies belongs to one."""
-        self.label, self.solve_count = np.full(num_bodies, -1), np.full(num_bodies, NEVER)
+        self.label, self.counts = np.full(num_bodies, -1), make_counts(num_bodies, NEVER, np.inf)
 
     def choose(self, _run: Any, _pair_events: Any) -> None:
         """No island is chosen."""
@@ -151,9 +152,9 @@ class NoSubstepping:
 class NoCompiledLoop:
     """A run whose events all need the loop in Python."""
 
-    def advance(self, _run: Any, _pair_events: Any, time: float, bodies: np.ndarray) -> tuple[float, np.ndarray]:
+    def advance(self, _run: Any, _pair_events: Any, event: tuple[float, np.ndarray], _until: float) -> tuple[float, np.ndarray]:
         """No event is dealt with."""
-        return time, bodies
+        return event
 
 
 class NoFlight:

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, CompiledShape, Geometry, build_geometry, compile_shape
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import from_matrix, multiply, rotate
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.forces.constant import ConstantForce, push_of_forces
+from rigidimpulse.engine.compile_shapes import compile_shapes, world_boxes
 from rigidimpulse.model.joint_table import compile_joints
 from rigidimpulse.model.world import World
 from rigidimpulse.scene.accuracy import Accuracy, resolve_accuracy
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.collision_filter import pairs_filtered
 from rigidimpulse.scene.joint import Joint
-from rigidimpulse.scene.mass import BodyMass, masses_of
+from rigidimpulse.scene.mass import BodyMass
 from rigidimpulse.scene.material import combine, combine_rolling
 from rigidimpulse.scene.scene import Scene, validate
 
@@ -33,17 +33,13 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
         SceneError: naming the body, the value and the remedy.
 
     """
-    validate(scene)
-    bodies = list(scene.bodies)
-    masses = masses_of(bodies)
+    masses, bodies = validate(scene), list(scene.bodies)
     joints = [effect for effect in scene.effects if isinstance(effect, Joint) and "joints" not in left_out]
     dynamic = np.array([body.becomes_dynamic for body in bodies], bool)
     moving = np.array([body.motion == "kinematic" and _is_driven(body) for body in bodies], bool)
     start = _start(bodies, masses)
-    shapes, shape_of_body = _compile_shapes(bodies, masses)
-    geometry = build_geometry(shapes)
-    size, radius = _extents(geometry, shape_of_body)
-    low, high = world_boxes(geometry, shape_of_body, start["position"], start["orientation"])
+    known, shape_of_body = compile_shapes(bodies, masses)
+    low, high = world_boxes(known.geometry, shape_of_body, start["position"], start["orientation"])
     material_of_body, coefficients, rolling = _materials(bodies)
     mass = np.array([m.mass for m in masses], float)
     inv_mass = np.where(dynamic, 1.0 / mass, 0.0)
@@ -54,8 +50,8 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
         scene=scene,
         accuracy=resolve_accuracy(accuracy),
         names=[body.name for body in bodies],
-        shapes=shapes,
-        geometry=geometry,
+        shapes=known.shapes,
+        geometry=known.geometry,
         dynamic=dynamic,
         moving=moving,
         mass=mass,
@@ -66,16 +62,16 @@ def compile_scene(scene: Scene, accuracy: str | Accuracy = "standard", left_out:
         push=push,
         steady_acceleration=gravity + push,
         shape_of_body=shape_of_body,
-        size=size,
-        bound_radius=radius,
+        size=known.size[shape_of_body],
+        bound_radius=known.radius[shape_of_body],
         static_min=low,
         static_max=high,
         material_of_body=material_of_body,
         coefficients=coefficients,
         rolling=rolling[:0, :0] if "rolling friction" in left_out else rolling,
-        flat=_has_faces(geometry, shape_of_body),
-        half_space=np.array([_all_half_spaces(geometry, k) for k in shape_of_body], bool),
-        ball=np.array([_is_ball(geometry, k) for k in shape_of_body], bool),
+        flat=known.flat[shape_of_body],
+        half_space=known.half_space[shape_of_body],
+        ball=known.ball[shape_of_body],
         contact_margin=TOLERANCES.contact.margin,
         impact_margin=TOLERANCES.contact.impact_margin,
         apart=_pairs_apart(joints, bodies, dynamic),
@@ -168,102 +164,6 @@ def _pairs_apart(joints: list[Joint], bodies: list[Body], dynamic: np.ndarray) -
 
 def _is_driven(body: Body) -> bool:
     return body.keyframes is not None or bool(np.any(body.velocity) or np.any(body.angular_velocity))
-
-
-def _compile_shapes(bodies: list[Body], masses: list[BodyMass]) -> tuple[list[CompiledShape], np.ndarray]:
-    """Compile each shape once for each frame it is used in."""
-    shapes: list[CompiledShape] = []
-    known: dict[tuple, int] = {}
-    index = np.zeros(len(bodies), np.int64)
-    for i, (body, m) in enumerate(zip(bodies, masses, strict=True)):
-        key = (body.shape.key, m.center_of_mass.tobytes(), m.axes.tobytes())
-        if key not in known:
-            known[key] = len(shapes)
-            shapes.append(compile_shape(body.shape, m.center_of_mass, m.axes))
-        index[i] = known[key]
-    return shapes, index
-
-
-def _primitives(geometry: Geometry, shape: int) -> range:
-    return range(int(geometry.shape_first[shape]), int(geometry.shape_first[shape + 1]))
-
-
-def _all_half_spaces(geometry: Geometry, shape: int) -> bool:
-    return all(geometry.kind[p] == HALF_SPACE for p in _primitives(geometry, shape))
-
-
-def _is_ball(geometry: Geometry, shape: int) -> bool:
-    p, last = int(geometry.shape_first[shape]), int(geometry.shape_first[shape + 1])
-    v = int(geometry.vertex_first[p])
-    single = last == p + 1 and geometry.kind[p] == ROUND and geometry.vertex_first[p + 1] == v + 1
-    return bool(single and not np.any(geometry.vertex[v]))
-
-
-def _primitive_points(geometry: Geometry, p: int) -> tuple[np.ndarray, float]:
-    """Points (k, 3) and the radius of the ball about each that enclose a finite primitive."""
-    if geometry.kind[p] == CYLINDER:
-        centre, axis, half = geometry.frame[p, :3], geometry.frame[p, 3:6], geometry.frame[p, 6]
-        return np.array([centre - half * axis, centre + half * axis]), float(geometry.radius[p])
-    return geometry.vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]], float(geometry.radius[p])
-
-
-def _extents(geometry: Geometry, shape_of_body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Largest extent and bounding radius about the centre of mass, of every body."""
-    size, radius = [], []
-    for shape in range(len(geometry.shape_first) - 1):
-        low, high, reach = np.full(3, np.inf), np.full(3, -np.inf), 0.0
-        for p in _primitives(geometry, shape):
-            if geometry.kind[p] == HALF_SPACE:
-                low, high, reach = np.full(3, -np.inf), np.full(3, np.inf), np.inf
-                break
-            points, r = _primitive_points(geometry, p)
-            low, high = np.minimum(low, points.min(0) - r), np.maximum(high, points.max(0) + r)
-            reach = max(reach, float(np.linalg.norm(points, axis=1).max()) + r)
-        size.append(float((high - low).max()))
-        radius.append(reach)
-    return np.array(size)[shape_of_body], np.array(radius)[shape_of_body]
-
-
-def world_boxes(
-    geometry: Geometry, shape_of_body: np.ndarray, position: np.ndarray, orientation: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lows and highs (n, 3) m of the boxes of all bodies; position (n, 3) m and orientation (n, 4) of their principal frames."""
-    low = np.full((len(shape_of_body), 3), np.inf)
-    high = -low
-    for i, shape in enumerate(shape_of_body):
-        for p in _primitives(geometry, int(shape)):
-            if geometry.kind[p] == HALF_SPACE:
-                low[i], high[i] = _plane_box(geometry.frame[p], position[i], orientation[i])
-                if len(_primitives(geometry, int(shape))) > 1:
-                    low[i], high[i] = -np.inf, np.inf
-                break
-            points, r = _primitive_points(geometry, p)
-            placed = rotate(orientation[i], points) + position[i]
-            low[i] = np.minimum(low[i], placed.min(0) - r)
-            high[i] = np.maximum(high[i], placed.max(0) + r)
-    return low, high
-
-
-def _plane_box(frame: np.ndarray, position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Box of a half space. Normal to an axis of the world it ends at the plane; else every body would be paired with every half space."""
-    low, high = np.full(3, -np.inf), np.full(3, np.inf)
-    normal = rotate(orientation, frame[:3])
-    if np.count_nonzero(normal) == 1 and np.abs(normal).max() == 1.0:
-        axis = int(np.argmax(np.abs(normal)))
-        (high if normal[axis] > 0.0 else low)[axis] = position[axis] + normal[axis] * frame[3]
-    return low, high
-
-
-def _has_faces(geometry: Geometry, shape_of_body: np.ndarray) -> np.ndarray:
-    """Polyhedra and cylinders: pairs of them need a gap for well-defined normals."""
-    flat = [
-        any(
-            geometry.kind[p] == CYLINDER or (geometry.kind[p] == ROUND and geometry.radius[p] == 0.0)
-            for p in _primitives(geometry, shape)
-        )
-        for shape in range(len(geometry.shape_first) - 1)
-    ]
-    return np.array(flat, bool)[shape_of_body]
 
 
 def _materials(bodies: list[Body]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -27,7 +27,8 @@ from rigidimpulse.core.quaternion import multiply, rotate
 from rigidimpulse.core.union_find import roots
 from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.soft_body.body import FlexibleBody
-from rigidimpulse.engine.compile_scene import compile_forces, varying_forces, world_boxes
+from rigidimpulse.engine.compile_scene import compile_forces, varying_forces
+from rigidimpulse.engine.compile_shapes import world_boxes
 from rigidimpulse.engine.run import Run, start_bodies
 from rigidimpulse.model.contact_memory import carried_memory, held_pairs
 from rigidimpulse.model.joint_table import compile_joints

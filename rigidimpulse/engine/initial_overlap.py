@@ -17,6 +17,7 @@ collide in that run.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -103,9 +104,13 @@ class _Search:
         self.run = run
         self.world = run.world
         self.position = run.world.position.copy()
-        self.ways_out = WaysOut(run.world)
         self.demands: dict[tuple[int, int], list[Demand]] = {}
         self.cluster, self.inv_mass = _clusters(run.world)
+
+    @cached_property
+    def ways_out(self) -> WaysOut:
+        """Made where two bodies are near each other."""
+        return WaysOut(self.world)
 
     def of_all_pairs(self) -> list[Demand]:
         """All demands."""

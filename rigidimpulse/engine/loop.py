@@ -1,6 +1,7 @@
 """From step to step: steps end on the grid of the accuracy's step, at keyframes, and where soft bodies ask for it.
 
-The kernel of balls (`spheres/`) takes many steps at once, as long as only simple impacts of balls happen in them.
+The kernel of balls (`spheres/`) takes many steps at once, as long as only simple impacts of balls happen in them. So does the compiled
+order of events (`exact/event_loop.py`), as long as they need nothing but exact contact.
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.effects import EventKernel
+from rigidimpulse.engine.exact.step_begin import GRID, step_end
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.spheres.effect import ARRIVED, GO_ON, STEP
 from rigidimpulse.engine.step import go_on, step
@@ -19,7 +20,6 @@ from rigidimpulse.motion.trajectory import FIXED
 
 WATCHED = 64
 """Steps at most between two looks at a run that somebody watches."""
-GRID = TOLERANCES.events.grid
 
 
 def run_to_end(run: Run, duration: float, progress: Callable[[float], None] | None) -> None:
@@ -49,8 +49,7 @@ def run_steps(run: Run, end: float, progress: Callable[[float], None] | None) ->
             stop = min(stop, (math.floor(begin / size + GRID) + WATCHED) * size)
         how = fly(run, stop) if run.flight.may_fly() else STEP
         if how == STEP:
-            boundary = (math.floor(state.time / size + GRID) + 1) * size
-            step(run, run.soft_bodies.advance(run, stop if stop < boundary + GRID * size else boundary))
+            step(run, run.soft_bodies.advance(run, step_end.py_func(state.time, stop, size)), stop)
         if progress is not None:
             progress(state.time)
 

@@ -43,6 +43,11 @@ SQUEEZED_REMEDY = "no motion keeps the body apart from all that presses on it; g
 NOT_RESOLVED_REMEDY = "the pair is left alone until the end of the step; use a smaller step"
 
 
+def most_pairs(number: int) -> int:
+    """How many pairs of a number of bodies are expected to have boxes that overlap."""
+    return max(64, 8 * number)
+
+
 class PairEvents:
     """Pairs of the step [begin, end], growing as bodies get new trajectories.
 
@@ -73,6 +78,11 @@ class PairEvents:
         """The pairs (k,) `PAIR`, a view."""
         return self.table.pairs[: self.table.number[USED]]
 
+    def follow(self, begin: float, end: float) -> None:
+        """Be those of the step [begin, end], which the compiled order of events took, and whose pairs are in the table."""
+        self.run.state.time = self.begin = begin
+        self.end = end
+
     def find_pairs(self) -> None:
         """Broad phase: the pairs whose boxes overlap in the step."""
         run, movable = self.run, self.table.movable
@@ -85,7 +95,7 @@ class PairEvents:
         path_boxes(trajectory, members, self.begin, self.end, world.bound_radius, box_min, box_max)
         box_min[members] -= MARGIN * world.largest_contact_margin
         box_max[members] += MARGIN * world.largest_contact_margin
-        first, second = find_overlapping(box_min, box_max, movable, max(64, 8 * world.num_bodies)).T.astype(np.int64)
+        first, second = find_overlapping(box_min, box_max, movable, most_pairs(world.num_bodies)).T.astype(np.int64)
         self._append(first, second, self.begin)
 
     def recall(self, begin: float) -> None:

@@ -142,6 +142,17 @@ def path_boxes(trajectory, members, begin, end, radius, box_min, box_max):
 
 
 @jit
+def clear_pairs(table, trajectory, constants):
+    """Forget the pairs of the step before, and what was known of its bodies; none belongs to a sub-stepped island."""
+    dynamic, moving = constants.dynamic, constants.moving
+    table.number[USED] = table.number[SHORT] = 0
+    for i in range(dynamic.shape[0]):
+        table.movable[i] = dynamic[i] or trajectory.mode[i] != FIXED
+        table.wake[i], table.looked_around[i] = np.inf, -np.inf
+        table.inside[i], table.asleep[i], table.without_space[i] = False, not (dynamic[i] or moving[i]), False
+
+
+@jit
 def is_swept(table, dynamic, a, b):
     """Whether a pair is swept: the sub-stepped regime looks after those of its members, and nothing moves those that sleep."""
     free = (dynamic[a] and not table.inside[a]) or (dynamic[b] and not table.inside[b])

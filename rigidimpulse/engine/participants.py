@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rigidimpulse.dynamics.forces.force import ForceTable
     from rigidimpulse.dynamics.forces.force_log import ForceWork
     from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
+    from rigidimpulse.engine.exact.step_begin import SolveCounts
     from rigidimpulse.engine.pair_table import PairTable
     from rigidimpulse.engine.touching import Shared
     from rigidimpulse.model.contacts import Contacts
@@ -249,8 +250,8 @@ class Substepping(Protocol):
     label: np.ndarray
 
     @property
-    def solve_count(self) -> np.ndarray:
-        """How often the exact regime has dealt with each body in the step, (n,)."""
+    def counts(self) -> SolveCounts:
+        """How often the exact regime deals with the bodies."""
         ...
 
     def choose(self, run: Any, pair_events: Any, /) -> None:
@@ -339,6 +340,9 @@ class Keyframed(Protocol):
 class Compiled(Protocol):
     """The compiled order of events: `CompiledLoop`, or `NoCompiledLoop`."""
 
-    def advance(self, run: Any, pair_events: Any, time: float, bodies: np.ndarray, /) -> tuple[float, np.ndarray]:
-        """Deal with events from that of these bodies at `time` on; returns the first event for the loop in Python."""
+    def advance(self, run: Any, pair_events: Any, event: tuple[float, np.ndarray], until: float, /) -> tuple[float, np.ndarray]:
+        """Deal with events from this one on, its time [s] and bodies; returns the first event for the loop in Python.
+
+        It may take more steps than that of the pairs, up to `until` [s].
+        """
         ...

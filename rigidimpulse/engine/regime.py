@@ -43,6 +43,8 @@ from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
 
 MANY, SOME, FEW, KEPT = 60, 12, 8, 2
+ASK = -1.0
+"""`SolveCounts.most` where it is asked at every step whether islands begin to be sub-stepped."""
 EXPENSIVE_SOLVES = 6.0
 EXPENSIVE_JOINTED, EXPENSIVE_SWING, EXPENSIVE_TALL, SMALL = 48.0, 300.0, 200.0, 8.0
 RATIO, REBOUND, ELASTIC, TALL = 30.0, 0.5, 0.9, 12
@@ -79,10 +81,15 @@ def may_begin(world: World, joined: np.ndarray, solve_count: np.ndarray) -> bool
 
     solve_count: (n,) how often the exact solver dealt with each body in the last step; with those that have joints, in the mean of steps.
     """
-    if not only_expensive(world):
-        return True
-    costly = _number(world) >= SOME and float(solve_count.sum()) > FEW * EXPENSIVE_SOLVES
+    costly = float(solve_count.sum()) > most_solves_of_all(world)
     return costly or bool(np.any(joined & (SMALL * solve_count > EXPENSIVE_JOINTED)))
+
+
+def most_solves_of_all(world: World) -> float:
+    """How often the exact solver deals with all bodies in a step, before islands without joints may begin to be sub-stepped."""
+    if not only_expensive(world):
+        return ASK
+    return FEW * EXPENSIVE_SOLVES if _number(world) >= SOME else np.inf
 
 
 def only_expensive(world: World) -> bool:

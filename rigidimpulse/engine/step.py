@@ -23,18 +23,18 @@ from rigidimpulse.engine.run import Run
 from rigidimpulse.model.island import Island
 
 
-def step(run: Run, end: float) -> None:
-    """Advance all trajectories to `end` [s]."""
-    begin, pair_events = run.state.time, PairEvents(run, end)
+def step(run: Run, end: float, until: float) -> None:
+    """Advance all trajectories to `end` [s], or by whole steps as far as `until` [s] where events need nothing but exact contact."""
+    pair_events = PairEvents(run, end)
     run.plan.perform(run.plan.pairs, run, pair_events)  # sub-stepped islands, which of them sleep; broad phase
-    time, bodies = begin, pair_events.active_bodies()  # load: resting, jointed, pushed, sub-stepped
-    while time < end:
-        time, bodies = run.compiled.advance(run, pair_events, time, bodies)  # as far as events need nothing but exact contact
-        if time < end:
+    time, bodies = pair_events.begin, pair_events.active_bodies()  # load: resting, jointed, pushed, sub-stepped
+    while time < pair_events.end:
+        time, bodies = run.compiled.advance(run, pair_events, (time, bodies), until)  # events that need nothing but exact contact
+        if time < pair_events.end:
             react(run, pair_events, time, bodies)
             time, bodies = next_event(run, pair_events)
-    run.state.time = end
-    run.plan.perform(run.plan.observe, run, begin, end)  # triggers
+    run.state.time = pair_events.end
+    run.plan.perform(run.plan.observe, run, pair_events.begin, pair_events.end)  # triggers
 
 
 def go_on(run: Run, begin: float, end: float, may_leave: bool) -> None:

@@ -29,7 +29,7 @@ import numpy as np
 from rigidimpulse.collision.manifold.shrunk_shapes import convex_polyhedra, several_polyhedra
 from rigidimpulse.core.claim import claim
 from rigidimpulse.core.kernel_cache import is_kept, note_beside, source_digest, variables_to_share_kernels
-from rigidimpulse.core.kernels import Kernel, is_cached
+from rigidimpulse.core.kernels import Kernel
 from rigidimpulse.model.world import World
 
 logger = logging.getLogger("rigidimpulse")
@@ -117,7 +117,9 @@ def _alone(seconds: float) -> Iterator[None]:
             held.close()
 
 
-def kernels_to_compile(world: World, with_events: bool, with_substepped: bool, is_ready: Callable[[Kernel], bool] = is_cached) -> list[str]:
+def kernels_to_compile(
+    world: World, with_events: bool, with_substepped: bool, is_ready: Callable[[Kernel], bool] = Kernel.is_cached
+) -> list[str]:
     """Kinds of kernels that a run of a world needs and that do not lie in the cache: what is compiled last of each tells.
 
     is_ready: whether a kernel need not be compiled.

@@ -161,7 +161,7 @@ def _take_steps(run: Run) -> None:
     """Some steps of the loop in Python."""
     run.recorder.start(run.state.trajectory)
     for number in range(1, 4):
-        step(run, number * STEP)
+        step(run, number * STEP, number * STEP)
 
 
 def _record(run: Run, contacts: Contacts, members: np.ndarray) -> None:
@@ -330,7 +330,7 @@ def _go_from_event_to_event(run: Run) -> None:
     start_trajectories(run)
     loop, pair_events = CompiledLoop(run), PairEvents(run, STEP)
     pair_events.find_pairs()
-    loop.advance(run, pair_events, 0.0, pair_events.active_bodies())
+    loop.advance(run, pair_events, (0.0, pair_events.active_bodies()), STEP)
     loop.say_compiled()
 
 

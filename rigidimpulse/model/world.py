@@ -72,7 +72,7 @@ class World:
     scene: Scene
     accuracy: Accuracy
     names: list[str]
-    shapes: list[CompiledShape]
+    shapes: Sequence[CompiledShape]
     geometry: Geometry
     dynamic: np.ndarray
     moving: np.ndarray

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from time import perf_counter
 from typing import NamedTuple
 
-from rigidimpulse.core.kernels import KERNELS
+from rigidimpulse.core.kernels import CALLED
 from rigidimpulse.model.effect import STAGES
 from rigidimpulse.model.plan import Plan
 
@@ -68,12 +68,12 @@ class Stopwatch:
     def __init__(self) -> None:
         """Note the counters of all kernels, whoever ran them before."""
         self._start = perf_counter()
-        self._before = {kernel: (kernel.calls, kernel.seconds, kernel.preparing) for kernel in KERNELS if kernel.calls}
+        self._before = {kernel: (kernel.calls, kernel.seconds, kernel.preparing) for kernel in CALLED}
 
     def read(self, plan: Plan) -> Profile:
         """What went by since the start."""
         kernels, preparing = {}, 0.0
-        for kernel in (kernel for kernel in KERNELS if kernel.calls):
+        for kernel in CALLED:
             calls, spent, prepared = self._before.get(kernel, (0, 0.0, 0.0))
             preparing += kernel.preparing - prepared
             if kernel.calls > calls and kernel.seconds > spent:

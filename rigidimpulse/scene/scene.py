@@ -14,7 +14,7 @@ from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.providers import provider
 from rigidimpulse.scene.body import Body, vector
 from rigidimpulse.scene.effect import SceneEffect
-from rigidimpulse.scene.mass import masses_of
+from rigidimpulse.scene.mass import BodyMass, masses_of
 
 if TYPE_CHECKING:
     from rigidimpulse.scene.origin import FileOrigin
@@ -146,8 +146,8 @@ def _check_name(name: object, what: str = "body") -> None:
         raise SceneError(f"the name {name[:80]!r} has a lone surrogate in it", "give letters that UTF-8 can write") from None
 
 
-def validate(scene: Scene) -> None:
-    """Check everything that can be known about a scene before it is compiled.
+def validate(scene: Scene) -> list[BodyMass]:
+    """Check everything that can be known about a scene before it is compiled; returns the masses of its bodies.
 
     Raises:
         SceneError: it names the body, the value and the remedy.
@@ -158,4 +158,4 @@ def validate(scene: Scene) -> None:
         raise SceneError("the scene has no bodies", "add one: scene.add(Body('ball', Shape.sphere(0.5)))")
     for body in scene.bodies:
         body.check()
-    masses_of(scene.bodies)
+    return masses_of(scene.bodies)

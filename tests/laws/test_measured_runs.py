@@ -14,9 +14,9 @@ import trimesh
 
 import rigidimpulse as ri
 from rigidimpulse.collision.distance.fcl import Narrowphase
-from rigidimpulse.collision.geometry import CompiledShape, compile_shape
+from rigidimpulse.collision.geometry import CompiledShape, build_geometry, compile_shape
 from rigidimpulse.core.quaternion import rotate, to_matrix
-from rigidimpulse.engine.measure.depth import Posed, Probe, Solid, depth_in, planes_of, probe_of, solid_of, surely_apart
+from rigidimpulse.engine.measure.depth import Posed, Probe, Solid, depth_in, probe_of, solid_of, surely_apart, whole_solid
 from rigidimpulse.engine.measure.energy import energy_rise
 from rigidimpulse.engine.measure.measure import measured_faults, record_of_recording
 from rigidimpulse.engine.measure.overlap import box_pairs
@@ -313,12 +313,12 @@ SHAPES = {
 
 def probe(shape: CompiledShape) -> Probe:
     """What of a shape may enter another one."""
-    return probe_of(shape, planes_of(shape))
+    return probe_of(shape)
 
 
 def solid(shape: CompiledShape) -> Solid:
     """What of a shape may be entered."""
-    return solid_of(shape, planes_of(shape))
+    return whole_solid(solid_of(shape), shape, build_geometry([shape]), 0)
 
 
 @pytest.mark.parametrize("other", SHAPES)

@@ -19,10 +19,9 @@ TUPLES = "from typing import NamedTuple\n\n\nclass {name}(NamedTuple):\n    {fir
 PROGRAM = """
 from rigidimpulse.core import tuples
 from rigidimpulse.core.caller import outer
-from rigidimpulse.core.kernels import is_cached
 
 kind = next(value for value in vars(tuples).values() if isinstance(value, type) and issubclass(value, tuple))
-known = is_cached(outer)
+known = outer.is_cached()
 print(outer(kind(10.0, 3.0)), len(outer.entry.stats.cache_hits), known)
 """
 NEEDED = ("kernels.py", "kernel_cache.py", "kernel_places.py", "numba_private.py", "processor.py", "ready_kernels.py")

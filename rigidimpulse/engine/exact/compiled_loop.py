@@ -21,6 +21,7 @@ from rigidimpulse.engine.exact.event_loop import (
     AT_END,
     AT_EVENT,
     BODIES,
+    FIND,
     HOLD,
     LOAD,
     MOVE,
@@ -44,9 +45,10 @@ from rigidimpulse.engine.exact.event_loop import (
     run_events,
 )
 from rigidimpulse.engine.exact.impacts import WITHOUT_REBOUND_REMEDY
+from rigidimpulse.engine.exact.step_begin import Steps
 from rigidimpulse.engine.impact_time import STALLED_REMEDY
 from rigidimpulse.engine.narrow_phase import FCL
-from rigidimpulse.engine.pair_events import INSTANT, NOT_RESOLVED_REMEDY, PairEvents
+from rigidimpulse.engine.pair_events import INSTANT, NOT_RESOLVED_REMEDY, PairEvents, most_pairs
 from rigidimpulse.engine.pair_table import pair_bodies
 from rigidimpulse.engine.run import NOT_FINITE_REMEDY, Run
 from rigidimpulse.model.world import World
@@ -59,6 +61,7 @@ FIRST_REPORTS = 256
 PATIENCE = 600.0
 """s, after which a process that said it would compile the kernel is not waited for any more."""
 EFFECTS = {
+    FIND: ("contact detection",),
     SWEEP: ("impact time",),
     RESPOND: ("impulses",),
     LOAD: ("steady load", "gyroscopic term"),
@@ -93,8 +96,8 @@ def why_not(world: World, plan: Plan) -> str:
     return f"without {missing[0]}" if missing else ""
 
 
-TABLE, MEMORY, LIMITER, LOG, CONTACT_LOG, SOLVE_COUNT, REPORTS = (
-    Loop._fields.index(name) for name in ("table", "memory", "limiter", "log", "contact_log", "solve_count", "reports")
+TABLE, MEMORY, LIMITER, LOG, CONTACT_LOG, REPORTS = (
+    Loop._fields.index(name) for name in ("table", "memory", "limiter", "log", "contact_log", "reports")
 )
 
 
@@ -120,12 +123,17 @@ class CompiledLoop:
         self._scratch = np.empty((SCRATCH_ROWS, 2), np.int64)
         self._reports = _make_reports(FIRST_REPORTS)
         state = run.state
+        pairs = np.empty((most_pairs(n), 2), np.int32)
+        self._steps = Steps(np.zeros(2), world.static_min, world.static_max, pairs)
+        # Others look at the run between two steps, or take its steps, there.
+        self._goes_on = not run.plan.observe and not run.plan.includes("event kernel")
         self._record = Record(
             Loop(
                 settings, world.compiled_shapes, pair_bodies(world), world.margins, world.coefficients, world.rolling, self._elsewhere,
                 run.motion, PairEvents(run, state.time).table, state.memory, state.limiter, run.log.buffers, run.contact_log.buffers,
                 run.recorder.frames, run.recorder.written, self._reports, run.error_estimate, run.detector.sweep_scratch, run.wrench,
-                run.column, state.sub_step, run.substepped.solve_count, run.impact_log, NO_JOINTS, self._cycles, self._calls,
+                run.column, state.sub_step, run.substepped.counts, self._steps, run.impact_log, NO_JOINTS, self._cycles,
+                self._calls,
             )
         )  # fmt: skip
 
@@ -150,19 +158,23 @@ class CompiledLoop:
     def _note(self, ending: str = "") -> Path:
         return note_beside(run_events.py_func, f"{self._record.layout_name}{ending}")
 
-    def advance(self, run: Run, pair_events: PairEvents, time: float, bodies: np.ndarray) -> tuple[float, np.ndarray]:
-        """Go on from the event of these bodies at `time` to the end of the step [s], or to an event for the loop in Python.
+    def advance(self, run: Run, pair_events: PairEvents, event: tuple[float, np.ndarray], until: float) -> tuple[float, np.ndarray]:
+        """Go on from an event, its time [s] and bodies, to the end of the step, or to an event for the loop in Python.
 
-        Returns the time and the bodies of that event.
+        Where nothing else looks at the run between two steps, the next ones are taken, too, as far as `until` [s]. Returns the time and the
+        bodies of the event.
         """
         if run.solve_rows is not None or (not pair_events.substepped_begun and pair_events.inside.any()):
-            return time, bodies
-        mark, is_given, how = np.zeros(run.world.num_bodies, bool), True, NO_CAPACITY
+            return event
+        mark, (time, bodies), is_given, how = np.zeros(run.world.num_bodies, bool), event, True, NO_CAPACITY
         mark[bodies] = True
         self._elsewhere[:] = run.substepped.label >= 0
+        self._steps.times[:] = pair_events.begin, pair_events.end
+        last = until if self._goes_on and not self._elsewhere.any() else pair_events.end
         while how not in (AT_END, AT_EVENT):
             start, before = perf_counter(), self._cycles.copy()
-            how, time, is_given = run_events(self._updated(run, pair_events), mark, is_given, time, pair_events.end, self._scratch)
+            how, time, is_given = run_events(self._updated(run, pair_events), mark, is_given, time, last, self._scratch)
+            pair_events.follow(*self._steps.times.tolist())
             self._account(perf_counter() - start, before)
             self._tell(run, pair_events)
             if how == NO_CAPACITY:
@@ -181,7 +193,6 @@ class CompiledLoop:
         record.replace(LIMITER, state.limiter)
         record.replace(LOG, run.log.buffers)
         record.replace(CONTACT_LOG, run.contact_log.buffers)
-        record.replace(SOLVE_COUNT, run.substepped.solve_count)
         record.replace(REPORTS, self._reports)
         return record
 

@@ -1,7 +1,7 @@
 """The order of a step, compiled: that of `engine/step.py`, for what is neither jointed nor pushed by varying forces nor sub-stepped.
 
-From event to event it calls the kernels that the loop in Python calls, in the same order, so the results are the same bits. It returns to
-Python at the end of the step, and before an event
+From event to event it calls the kernels that the loop in Python calls, in the same order, so the results are the same bits. It takes one
+step after the other, see `step_begin`, and returns to Python at the end of a step where it may not begin the next one, and before an event
 
     that reaches a body which the loop in Python must look after (`Fixed.elsewhere`), or with a body that runs away,
     for which there is no space in the memory of contacts or in what is recorded.
@@ -40,6 +40,7 @@ from rigidimpulse.engine.exact.impacts import (
     remember_rebounds,
     resolve_impacts,
 )
+from rigidimpulse.engine.exact.step_begin import BEGIN, END, SolveCounts, Steps, begin_step
 from rigidimpulse.engine.exact.step_size import ErrorEstimate, Forces, StepLimits, Turning, hold_turning, turns
 from rigidimpulse.engine.exact.trajectories import begin_steady_trajectory, set_impact_margins
 from rigidimpulse.engine.exact.velocity_projection import ProjectionScratch, project, project_alone
@@ -99,15 +100,17 @@ from rigidimpulse.recording.events import has_capacity as has_log_capacity
 from rigidimpulse.recording.recorder import Frames
 
 AT_END, AT_EVENT, NO_CAPACITY, SHORT_OF_PAIRS = np.arange(4)
-"""How the loop ends: at the end of the step; before an event that Python looks after; before one for which there is no space; after one
+"""How the loop ends: at the end of a step; before an event that Python looks after; before one for which there is no space; after one
 that found no space for a pair."""
-SWEEP, RESPOND, LOAD, HOLD, MOVE, VERBS = np.arange(6)
+FIND, SWEEP, RESPOND, LOAD, HOLD, MOVE, VERBS = np.arange(7)
 """Places in `Loop.cycles` and `Loop.calls`."""
 ENERGIES = 6
 """Changes of energy, or problems, at an instant of a body, at most."""
 FIRST_CONTACTS, NONE, NO_ROWS = np.int64(256), np.int64(-1), np.int64(0)
 MORE_CONTACTS, MOST_NEW = 4, 256
 """How many times more contacts an island may have after a position correction, and how many more on top."""
+MOST_EVENTS = 256
+"""Events after which it returns at the end of a step: somebody may wait for a word, or want to stop the run."""
 IMPULSES = 256
 """Impulses of a contact at an instant that there is space for."""
 
@@ -162,7 +165,8 @@ class Loop(NamedTuple):
     wrench: np.ndarray  # (n, 6) N, N m by contacts
     number: np.ndarray  # (n,) working memory
     sub_step: np.ndarray  # (n,) s, see `State`
-    solve_count: np.ndarray  # (n,) how often a body was dealt with in the step
+    counts: SolveCounts
+    steps: Steps
     impacts: np.ndarray  # (k, 7) working memory, see `point.log_impact`
     no_joints: JointBlock
     cycles: np.ndarray  # (VERBS,) processor cycles of each verb
@@ -252,16 +256,16 @@ def make_found(capacity, number, scratch):
 
 
 @jit_making_arrays
-def run_events(loop, bodies, is_given, time, end, scratch):
-    """Go from event to event, from `time` to the end of the step [s].
+def run_events(loop, bodies, is_given, time, until, scratch):
+    """Go from event to event, from `time` to the end of the step, and of further steps that end at `until` [s] or before.
 
     bodies (n,) bool: of the event at `time` if `is_given`, else after that; and then those of the event before which it ends. scratch: see
-    `manifold.contact_points`. Returns how it ends, when, and whether that is the event that was given.
+    `manifold.contact_points`. Returns how it ends, when, and whether that is the event that was given; `loop.steps` tells in which step.
     """
     motion, table, shapes, constants = loop.motion, loop.table, loop.shapes, loop.bodies.constants
     number, limiter, used_cycles, calls = len(bodies), loop.limiter, loop.cycles, loop.calls
     shared = Shared(limiter.under_contact, limiter.sharing, np.empty((0, 2), np.int64))
-    found = make_found(FIRST_CONTACTS, number, scratch)
+    found, end, events = make_found(FIRST_CONTACTS, number, scratch), loop.steps.times[END], 0
     while True:
         if not _can_report(loop.reports, number, table.number[USED]):
             return NO_CAPACITY, time, is_given
@@ -272,7 +276,14 @@ def run_events(loop, bodies, is_given, time, end, scratch):
             calls[SWEEP] += 1
             time = next_time(table)
             if time >= end:
-                return AT_END, end, is_given
+                start = cycles()
+                begins = events < MOST_EVENTS and begin_step(loop, until, bodies)
+                used_cycles[FIND] += cycles() - start
+                if not begins:
+                    return AT_END, end, is_given
+                calls[FIND] += 1
+                time, end, is_given = loop.steps.times[BEGIN], loop.steps.times[END], True
+                continue
             mark_met(table, constants.dynamic, time, bodies)
         count = NONE
         while count < 0:
@@ -293,6 +304,7 @@ def run_events(loop, bodies, is_given, time, end, scratch):
         if not _react(loop, found, count, time, end):
             return AT_EVENT, time, True
         is_given = False
+        events += 1
         if table.number[SHORT]:
             return SHORT_OF_PAIRS, time, is_given
 
@@ -334,7 +346,7 @@ def _count_contacts(loop, time):
 @jit
 def _give_up(loop, kind, time, places):
     """Mark the bodies of pairs as those that run away, or report the pairs where nothing is handed over."""
-    dynamic, solve_count, table = loop.bodies.constants.dynamic, loop.solve_count, loop.table
+    dynamic, solve_count, table = loop.bodies.constants.dynamic, loop.counts.solves, loop.table
     for k in range(places.shape[0]):
         pair, handed = table.pairs[places[k]], False
         for i in (pair.a, pair.b):
@@ -369,7 +381,7 @@ def _react(loop, found, count, time, end):
     root, order = np.empty(number, np.int64), np.empty(count, np.int64)
     split_islands(dynamic, np.empty((0, 2), np.int64), found, count, root, order)
     touch = _touch(loop, found, order, time)
-    islands, solve_count = _islands(motion.now, root, touch.contacts, dynamic, time, end), loop.solve_count
+    islands, solve_count = _islands(motion.now, root, touch.contacts, dynamic, time, end), loop.counts.solves
     if _runs_away(solve_count, islands):
         return False
     _arrive(loop, islands, touch, found.reached, time)

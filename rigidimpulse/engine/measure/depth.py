@@ -23,6 +23,7 @@ import numpy as np
 
 from rigidimpulse.collision.containment import points_inside
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, CompiledShape, Geometry, Primitive, build_geometry
+from rigidimpulse.core.kept import kept_with_argument
 
 MOST_EDGES: int = 96
 """Edges of a primitive that are looked at, evenly chosen of all; all corners of those with fewer count."""
@@ -70,6 +71,7 @@ class Solid:
     boxes: list[np.ndarray]  # (2, 3) m, lowest and highest corner of each of these
     rounded: list[tuple[np.ndarray, np.ndarray, float]]  # ends (3,) of a segment, and its radius, m
     cylinders: list[Primitive]
+    hollow: list[Primitive]  # surfaces that are not convex, or open
     surface: np.ndarray  # (t, 3, 3) m, triangles of closed surfaces that are not convex
     middles: np.ndarray  # (t, 4) m, of these triangles, and how far their corners are
     inside: tuple[Geometry, int] | None  # compiled shape of these surfaces
@@ -93,15 +95,17 @@ class Posed:
         return Posed(self.rotation[which], self.translation[which])
 
 
-def planes_of(shape: CompiledShape) -> list[np.ndarray | None]:
-    """Planes (m, 4) of each primitive that is convex and has faces, for `probe_of` and `solid_of`."""
+@kept_with_argument
+def _planes_of(shape: CompiledShape) -> list[np.ndarray | None]:
+    """Planes (m, 4) of each primitive that is convex and has faces."""
     return [_convex_planes(primitive) if len(primitive.faces) else None for primitive in shape.primitives]
 
 
-def probe_of(shape: CompiledShape, planes: list[np.ndarray | None]) -> Probe:
+@kept_with_argument
+def probe_of(shape: CompiledShape) -> Probe:
     """What of a shape may enter another one."""
     centres, radii, edges = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros((0, 2, 3))]
-    for primitive, faces in zip(shape.primitives, planes, strict=True):
+    for primitive, faces in zip(shape.primitives, _planes_of(shape), strict=True):
         if primitive.kind == CYLINDER:
             centres.append(_points_of(primitive))
             radii.append(np.zeros(len(centres[-1])))
@@ -113,10 +117,11 @@ def probe_of(shape: CompiledShape, planes: list[np.ndarray | None]) -> Probe:
     return Probe(np.vstack(centres), np.concatenate(radii), np.concatenate(edges), _hull_corners(shape))
 
 
-def solid_of(shape: CompiledShape, planes: list[np.ndarray | None], geometry: Geometry | None = None, index: int = 0) -> Solid:
-    """What of a shape may be entered; open surfaces may not. geometry, index: where the shape is compiled already, if it is."""
-    solid, hollow = Solid([], [], [], [], np.zeros((0, 3, 3)), np.zeros((0, 4)), None, _bounds(shape)), []
-    for primitive, faces in zip(shape.primitives, planes, strict=True):
+@kept_with_argument
+def solid_of(shape: CompiledShape) -> Solid:
+    """What of a shape may be entered; open surfaces may not, and others only as part of a `whole_solid`."""
+    solid = Solid([], [], [], [], [], np.zeros((0, 3, 3)), np.zeros((0, 4)), None, _bounds(shape))
+    for primitive, faces in zip(shape.primitives, _planes_of(shape), strict=True):
         if primitive.kind == HALF_SPACE:
             solid.convex.append(primitive.frame[None, :4])
             solid.boxes.append(np.array([[-np.inf], [np.inf]]) * np.ones(3))
@@ -125,17 +130,22 @@ def solid_of(shape: CompiledShape, planes: list[np.ndarray | None], geometry: Ge
         elif not len(primitive.faces):
             solid.rounded.append((primitive.vertices[0], primitive.vertices[-1], primitive.radius))
         elif faces is None:
-            hollow.append(primitive)
+            solid.hollow.append(primitive)
         else:
             solid.convex.append(faces)
             solid.boxes.append(np.array([primitive.vertices.min(axis=0), primitive.vertices.max(axis=0)]))
     if len(shape.primitives) == 1 and solid.convex and len(solid.convex[0]) <= MOST_BOUNDS:
         return replace(solid, bounds=np.vstack([solid.bounds, solid.convex[0]]))
-    if not hollow:
+    return solid
+
+
+def whole_solid(solid: Solid, shape: CompiledShape, geometry: Geometry, index: int) -> Solid:
+    """A solid with its surfaces that are not convex, if it has any; geometry, index: where its shape is compiled."""
+    if not solid.hollow:
         return solid
-    if geometry is None or len(hollow) < len(shape.primitives):
-        geometry, index = build_geometry([CompiledShape(tuple(hollow))]), 0
-    surface = np.concatenate([p.vertices[p.faces] for p in hollow])
+    if len(solid.hollow) < len(shape.primitives):
+        geometry, index = build_geometry([CompiledShape(tuple(solid.hollow))]), 0
+    surface = np.concatenate([p.vertices[p.faces] for p in solid.hollow])
     middle = surface.mean(axis=1)
     farthest = np.linalg.norm(surface - middle[:, None], axis=2).max(axis=1)
     return replace(solid, surface=surface, middles=np.column_stack([middle, farthest]), inside=(geometry, index))
@@ -313,6 +323,7 @@ def _bounds(shape: CompiledShape) -> np.ndarray:
     return np.column_stack([np.vstack([-np.eye(3), np.eye(3)]), [*-low, *high]]) if np.all(np.isfinite(high)) else np.zeros((0, 4))
 
 
+@kept_with_argument
 def box_of(shape: CompiledShape) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest corner (3,) m of a shape along the axes of its frame; without end for half spaces."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.core.quaternion import to_matrix
-from rigidimpulse.engine.measure.depth import Posed, Probe, Solid, box_of, depth_in, planes_of, probe_of, solid_of, surely_apart
+from rigidimpulse.engine.measure.depth import Posed, Probe, Solid, box_of, depth_in, probe_of, solid_of, surely_apart, whole_solid
 from rigidimpulse.engine.measure.record import Fault, RunRecord
 from rigidimpulse.model.world import World
 
@@ -75,6 +75,8 @@ def overlap_faults(record: RunRecord) -> list[Fault]:
     found, names = overlap_depths(record), record.world.names
     bound = _bound(record)
     deep = found.depth > bound * found.size
+    if not deep.any():
+        return []
     faults = []
     for pair in np.unique(np.column_stack([found.a, found.b])[deep], axis=0).tolist():
         mine = np.flatnonzero((found.a == pair[0]) & (found.b == pair[1]))
@@ -100,13 +102,13 @@ def _bound(record: RunRecord) -> float:
 
 def overlap_depths(record: RunRecord) -> Depths:
     """Depths of all candidates, see the head of the module."""
-    world = record.world
-    frame, a, b = _candidates(record)
+    world, found = record.world, _candidates(record)
+    a, b = found.a, found.b
     size, depth = np.minimum(world.size[a], world.size[b]), np.zeros(len(a))
     if not len(a):
-        return Depths(frame, a, b, depth, size)
+        return Depths(found.frame, a, b, depth, size)
     shapes, of, near = _Shapes(world), world.shape_of_body, np.arange(len(a))
-    both = [(of[mine], of[other], _posed(record, frame, mine, other)) for mine, other in ((a, b), (b, a))]
+    both = [(of[a], of[b], found.a_in_b), (of[b], of[a], _other_way(found.a_in_b))]
     for mine, other, posed in both:
         near = near[~shapes.surely_apart(mine[near], other[near], posed.part(near))]
     for mine, other, posed in both:
@@ -115,39 +117,31 @@ def overlap_depths(record: RunRecord) -> Depths:
             for first in range(0, len(those), length):
                 here = those[first : first + length]
                 depth[here] = np.maximum(depth[here], depth_in(solid, probe, posed.part(here)))
-    return Depths(frame, a, b, depth, size)
+    return Depths(found.frame, a, b, depth, size)
 
 
 class _Shapes:
-    """Probes and solids of shapes, made when they are first asked for."""
+    """Probes and solids of the shapes of a world, by their numbers."""
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._planes: dict[int, list[np.ndarray | None]] = {}
-        self._probes: dict[int, Probe] = {}
-        self._solids: dict[int, Solid] = {}
-
-    def _planes_of(self, shape: int) -> list[np.ndarray | None]:
-        if shape not in self._planes:
-            self._planes[shape] = planes_of(self._world.shapes[shape])
-        return self._planes[shape]
+        self._whole: dict[int, Solid] = {}
 
     def probe(self, shape: int) -> Probe:
-        if shape not in self._probes:
-            self._probes[shape] = probe_of(self._world.shapes[shape], self._planes_of(shape))
-        return self._probes[shape]
+        return probe_of(self._world.shapes[shape])
 
     def solid(self, shape: int) -> Solid:
-        if shape not in self._solids:
-            self._solids[shape] = solid_of(self._world.shapes[shape], self._planes_of(shape), self._world.geometry, shape)
-        return self._solids[shape]
+        return solid_of(self._world.shapes[shape])
+
+    def whole(self, shape: int) -> Solid:
+        if shape not in self._whole:
+            self._whole[shape] = whole_solid(self.solid(shape), self._world.shapes[shape], self._world.geometry, shape)
+        return self._whole[shape]
 
     def kinds(self, mine: np.ndarray, other: np.ndarray, which: np.ndarray) -> Iterator[tuple[Probe, Solid, np.ndarray]]:
         """Probe and solid of each kind of the candidates `which`, and those of that kind; mine, other: (c,) shapes of all."""
-        kinds, number = np.unique(np.column_stack([mine[which], other[which]]), axis=0, return_inverse=True)
-        which, ends = which[np.argsort(number, kind="stable")], np.cumsum(np.bincount(number))
-        for k, (probe, solid) in enumerate(kinds.tolist()):
-            yield self.probe(probe), self.solid(solid), which[ends[k - 1] if k else 0 : ends[k]]
+        for probe, solid, those in _kinds(mine[which], other[which]):
+            yield self.probe(probe), self.whole(solid), which[those]
 
     def surely_apart(self, mine: np.ndarray, other: np.ndarray, posed: Posed) -> np.ndarray:
         """Which candidates (c,) are apart, see `depth.surely_apart`; mine, other: (c,) shapes.
@@ -159,14 +153,21 @@ class _Shapes:
             return out
         corners = _Padded({shape: self.probe(shape).corners for shape in np.unique(mine).tolist()})
         bounds = _Padded({shape: self.solid(shape).bounds for shape in np.unique(other).tolist()})
-        sizes, number = np.unique(np.column_stack([corners.size[mine], bounds.size[other]]), axis=0, return_inverse=True)
-        for k, (most_corners, most_bounds) in enumerate(sizes.tolist()):
-            those = np.flatnonzero(number == k)
+        for most_corners, most_bounds, those in _kinds(corners.size[mine], bounds.size[other]):
             length = max(AT_ONCE // max(most_corners * most_bounds, 1), 1)
             for first in range(0, len(those), length):
                 here = those[first : first + length]
                 out[here] = surely_apart(corners.of(mine[here]), bounds.of(other[here]), posed.part(here))
         return out
+
+
+def _kinds(first: np.ndarray, second: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:
+    """Each pair of numbers of `first` and `second` (c,), in order, and the places at which it stands."""
+    many = int(second.max(initial=0)) + 1
+    pairs, number = np.unique(first * many + second, return_inverse=True)
+    places, ends = np.argsort(number, kind="stable"), np.cumsum(np.bincount(number))
+    for k, pair in enumerate(pairs.tolist()):
+        yield pair // many, pair % many, places[ends[k - 1] if k else 0 : ends[k]]
 
 
 class _Padded:
@@ -200,12 +201,9 @@ def _work(probe: Probe, solid: Solid) -> int:
     return len(probe.radii) * faces + ends * (faces if len(solid.surface) else OF_EDGE)
 
 
-def _posed(record: RunRecord, frame: np.ndarray, mine: np.ndarray, other: np.ndarray) -> Posed:
-    """Poses of bodies `mine` (c,) in the frames of bodies `other` (c,)."""
-    position, orientation = record.frames.position, record.frames.orientation
-    rotation, into = to_matrix(orientation[frame, mine]), to_matrix(orientation[frame, other])
-    apart = position[frame, mine] - position[frame, other]
-    return Posed(np.einsum("cji,cjk->cik", into, rotation), np.einsum("cji,cj->ci", into, apart))
+def _other_way(posed: Posed) -> Posed:
+    """Poses of the other shape's frame in that of the first."""
+    return Posed(posed.rotation.swapaxes(1, 2), -np.einsum("cji,cj->ci", posed.rotation, posed.translation))
 
 
 def frames_looked_at(record: RunRecord) -> np.ndarray:
@@ -217,11 +215,22 @@ def frames_looked_at(record: RunRecord) -> np.ndarray:
     return np.unique(np.linspace(0, number - 1, count).astype(int))
 
 
-def _candidates(record: RunRecord) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Frames, bodies a and bodies b > a (c,) of the candidates, frame by frame."""
+@dataclass(frozen=True, eq=False)
+class _Candidates:
+    """Pairs of bodies a < b that may be inside each other, c of them, frame by frame."""
+
+    frame: np.ndarray  # (c,)
+    a: np.ndarray  # (c,)
+    b: np.ndarray  # (c,)
+    a_in_b: Posed  # frames of bodies a in those of bodies b
+
+
+def _candidates(record: RunRecord) -> _Candidates:
+    """The candidates of a run."""
     frames, world = record.frames, record.world
     if not world.can_collide or world.accuracy.impact_time in LATE:
-        return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
+        none = np.zeros(0, np.int64)
+        return _Candidates(none, none, none, Posed(np.zeros((0, 3, 3)), np.zeros((0, 3))))
     chosen = frames_looked_at(record)
     position, orientation = frames.position[chosen], frames.orientation[chosen]
     still = np.zeros(position.shape[:2], bool)
@@ -234,7 +243,10 @@ def _candidates(record: RunRecord) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     reach[:, endless] = np.inf
     k, a, b = box_pairs(middle - reach, middle + reach)
     kept = (dynamic[k, a] | dynamic[k, b]) & ~(still[k, a] & still[k, b]) & ~world.is_apart(a, b)
-    return chosen[k[kept]], a[kept], b[kept]
+    k, a, b = k[kept], a[kept], b[kept]
+    into, apart = rotation[k, b], position[k, a] - position[k, b]
+    in_b = Posed(np.einsum("cji,cjk->cik", into, rotation[k, a]), np.einsum("cji,cj->ci", into, apart))
+    return _Candidates(chosen[k], a, b, in_b)
 
 
 def _boxes_of_bodies(world: World) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -25,6 +25,7 @@ from rigidimpulse.dynamics.energy import mechanical_energy
 from rigidimpulse.engine.cheapest import CheapestRegime
 from rigidimpulse.engine.exact.advance import NOT_HELD
 from rigidimpulse.engine.exact.energy_limit import note_end_energy
+from rigidimpulse.engine.exact.step_begin import SolveCounts
 from rigidimpulse.engine.exact.trajectories import account_contact_work, begin_trajectory
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.participants import Substepping
@@ -129,19 +130,19 @@ class SubsteppedIslands:
         return ContactStepper(self._world, self._movable, self._parts, self._sharing)
 
     @property
-    def solve_count(self) -> np.ndarray:
-        """How often the exact regime has dealt with each body in the step, (n,)."""
-        return self.hand_over.solve_count
+    def counts(self) -> SolveCounts:
+        """How often the exact regime deals with the bodies."""
+        return self.hand_over.counts
 
     def carry_on(self, earlier: Substepping, old: np.ndarray, new: np.ndarray) -> None:
         """Know of exact bodies `new` (k,) what an earlier run knew of them as `old` (k,)."""
-        self.solve_count[new] = earlier.solve_count[old]
+        self.counts.solves[new] = earlier.counts.solves[old]
         if isinstance(earlier, SubsteppedIslands):
             self.hand_over.carry_on(earlier.hand_over, old, new)
 
     def is_idle(self) -> bool:
         """Whether no island is sub-stepped and none may begin to be."""
-        return self._is_idle(np.maximum(self.solve_count, 0.0))
+        return self._is_idle(np.maximum(self.counts.solves, 0.0))
 
     def _is_idle(self, solve_count: np.ndarray) -> bool:
         """The same for these counts (n,) of solves in the last step."""

@@ -15,15 +15,14 @@ from __future__ import annotations
 import numpy as np
 
 from rigidimpulse.engine.cheapest import CheapestRegime
+from rigidimpulse.engine.exact.step_begin import begin_counts, make_counts
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.pair_table import NEVER, RUNAWAY, USED, most_solves
-from rigidimpulse.engine.regime import REBOUND, unlike
+from rigidimpulse.engine.regime import ASK, REBOUND, most_solves_of_all, unlike
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.island import Island
 from rigidimpulse.model.world import World
 
-OF_MEAN = 0.125
-"""Part of the mean number of solves that each step is, for bodies with joints."""
 MOST_REBOUNDS = 30000.0
 """Times in a step that bodies which rebound by more than REBOUND may be dealt with beyond RUNAWAY: about a second of the compiled loop."""
 MOST_UNLIKE = 6000.0
@@ -36,7 +35,7 @@ class HandOver:
     """How often the exact regime deals with n bodies, and which of them it hands over.
 
     Attributes:
-        solve_count: (n,) times in the step; inf: no impulse keeps the body apart from another, NEVER: it is not handed over.
+        counts: how often the exact regime deals with the bodies.
         open: (n,) bool, bodies whose joints sub-steps did not close.
         cheapest: what judges by cost, with contact_solver="cheapest" only.
 
@@ -46,30 +45,30 @@ class HandOver:
         """jointed (n,) bool: bodies with joints."""
         self._world, self._jointed, self.cheapest = world, jointed, cheapest
         self._auto = world.accuracy.contact_solver == "auto"
-        self._mean_solves, self.open = np.zeros(world.num_bodies), np.zeros(world.num_bodies, bool)
-        self._spared = np.zeros(world.num_bodies, bool)
-        self.solve_count, self._step_end = self._no_solves(), 0.0
+        self.open = np.zeros(world.num_bodies, bool)
+        # Nothing is handed over where everything is sub-stepped.
+        first = 0.0 if self._auto or cheapest else NEVER
+        self.counts = make_counts(world.num_bodies, first, most_solves_of_all(world) if self._auto else ASK)
         self._handed: dict[tuple[str, ...], int] = {}
 
-    def _no_solves(self) -> np.ndarray:
-        """Counts (n,) at the start of a step; nothing is handed over where everything is sub-stepped."""
-        return np.full(self._world.num_bodies, 0.0 if self._auto or self.cheapest else NEVER)
+    @property
+    def solve_count(self) -> np.ndarray:
+        """How often the exact regime has dealt with each body in the step, (n,)."""
+        return self.counts.solves
 
     def carry_on(self, earlier: HandOver, old: np.ndarray, new: np.ndarray) -> None:
         """Know of exact bodies `new` (k,) what an earlier run knew of them as `old` (k,)."""
-        self._mean_solves[new], self.open[new] = earlier._mean_solves[old], earlier.open[old]
+        self.counts.mean[new], self.open[new] = earlier.counts.mean[old], earlier.open[old]
         if self.cheapest is not None and earlier.cheapest is not None:
             self.cheapest.carry_on(earlier.cheapest, old, new)
 
     def begin_step(self, end: float) -> np.ndarray:
         """Count from nought in the step that ends at `end`; returns the counts (n,) before, by which its islands are judged."""
         last = np.maximum(self.solve_count, 0.0)
-        if end > self._step_end:
-            self._mean_solves += OF_MEAN * (np.minimum(last, RUNAWAY) - self._mean_solves)
-            self._spared[:] = False
-            self.solve_count, self._step_end = self._no_solves(), end
+        if end > self.counts.step_end[0]:
+            begin_counts(self.counts, end)
         # One step with many events is no reason to leave the exact regime with a mechanism: it stays out of it for long.
-        return np.where(self._jointed & self._auto, self._mean_solves, last)
+        return np.where(self._jointed & self._auto, self.counts.mean, last)
 
     def may_take(self, bodies: np.ndarray) -> bool:
         """Whether islands of bodies that no impulse keeps apart are handed over; they are, when they are looked at next."""
@@ -93,10 +92,10 @@ class HandOver:
         members, rebound = island.members, float(island.contacts.restitution.max(initial=0.0))
         stuck, pressed = bool(np.isposinf(self.solve_count[members]).any()), bool(pair_events.pressed()[members].any())
         # Many impacts are what some scenes are about. Where joints are, each takes a thousand times as long.
-        spared = self.cheapest is None and not stuck and not self._jointed[members].any() and not self._spared[members].all()
+        spared = self.cheapest is None and not stuck and not self._jointed[members].any() and not self.counts.spared[members].all()
         more = MOST_REBOUNDS if rebound > REBOUND else MOST_UNLIKE / len(members) if self._is_unlike(pair_events, members) else 0.0
         if spared and more > 0.0:
-            self._spared[members], self.solve_count[members] = True, -more
+            self.counts.spared[members], self.solve_count[members] = True, -more
             return False
         if pressed or self.open[members].any():
             # Looked at, and left to the exact regime until the end of the step.

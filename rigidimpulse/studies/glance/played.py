@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from time import perf_counter
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.core.kernels import KERNELS
+from rigidimpulse.core.kernels import CALLED
 from rigidimpulse.core.providers import load_function
 from rigidimpulse.engine.simulate import simulate_whole
 from rigidimpulse.recording.recording import Recording
@@ -96,4 +96,4 @@ def watch(limit: float) -> Callable[[float], None]:
 
 def _preparing() -> float:
     """Time that kernels of this process took to load or compile until now, s."""
-    return sum(kernel.preparing for kernel in KERNELS)
+    return sum(kernel.preparing for kernel in CALLED)
