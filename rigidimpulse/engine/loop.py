@@ -1,7 +1,7 @@
 """From step to step: steps end on the grid of the accuracy's step, at keyframes, and where soft bodies ask for it.
 
 The kernel of balls (`spheres/`) takes many steps at once, as long as only simple impacts of balls happen in them. So does the compiled
-order of events (`exact/event_loop.py`), as long as they need nothing but exact contact.
+order of events (`exact/event_loop.py`), as long as they need nothing but exact contact and nobody watches the run.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ def run_steps(run: Run, end: float, progress: Callable[[float], None] | None) ->
             stop = min(stop, (math.floor(begin / size + GRID) + WATCHED) * size)
         how = fly(run, stop) if run.flight.may_fly() else STEP
         if how == STEP:
-            step(run, run.soft_bodies.advance(run, step_end.py_func(state.time, stop, size)), stop)
+            boundary = run.soft_bodies.advance(run, step_end.py_func(state.time, stop, size))
+            step(run, boundary, until=stop if progress is None else boundary)
         if progress is not None:
             progress(state.time)
 

@@ -15,6 +15,7 @@ import pytest
 import rigidimpulse as ri
 from rigidimpulse.engine.absent import NoCompiledLoop
 from rigidimpulse.engine.exact.compiled_loop import CompiledLoop
+from rigidimpulse.engine.exact.event_loop import MOST_EVENTS, run_events
 from rigidimpulse.engine.simulate import complete, prepare
 
 FPS = 60.0
@@ -79,14 +80,14 @@ def plate_under_a_load() -> ri.Scene:
 
 @pytest.mark.parametrize("make", [falling_boxes, tetrahedra_in_a_tray, balls_and_boxes, many_boxes, plate_under_a_load])
 def test_both_loops_give_the_same_bits(make: Callable[[], ri.Scene]) -> None:
-    recordings = []
-    for compiled in (True, False):
+    recordings: list[ri.Recording] = []
+    for compiled, progress in ((True, None), (True, lambda _time: None), (False, None)):
         run = prepare(make(), np.arange(61) / FPS)
         run.compiled = CompiledLoop(run) if compiled else NoCompiledLoop()
-        recordings.append(complete(run, 1.0))
-    one, other = recordings
+        recordings.append(complete(run, 1.0, progress))
+    one, watched, other = recordings
     assert len(one.impacts) > 3
-    assert one.state_hash() == other.state_hash()
+    assert one.state_hash() == watched.state_hash() == other.state_hash()
     np.testing.assert_array_equal(one.contacts, other.contacts)
     assert one.ledger.dissipated.keys() == other.ledger.dissipated.keys()
     for cause, energy in one.ledger.dissipated.items():
@@ -103,3 +104,16 @@ def test_a_loop_that_asks_for_more_memory_gives_the_same_bits() -> None:
     tight.contact_log.buffers = tight.contact_log.buffers._replace(rows=tight.contact_log.buffers.rows[:8])
     tight.compiled = CompiledLoop(tight)
     assert complete(tight, 1.0).state_hash() == plain.state_hash()
+
+
+def test_steps_of_exact_contact_follow_each_other_without_python() -> None:
+    """A die falls, rebounds, rubs and comes to rest; Python is asked again only after so many events that somebody may wait for it."""
+    scene = floor(ri.Scene())
+    scene.add(ri.Body("die", ri.Shape.box(0.016), position=(0, 0, 0.1), orientation=(0.9, 0.3, 0.1, 0.2), velocity=(0.3, 0.0, 0.0)))
+    run = prepare(scene, np.arange(91) / FPS)
+    run.compiled = CompiledLoop(run)
+    before = run_events.calls
+    recording = complete(run, 1.5)
+    events = run.plan.line("impact time").calls
+    assert np.all(recording.velocities[-1] == 0.0) and events > 20
+    assert run_events.calls - before <= 2 + events // MOST_EVENTS
