@@ -81,18 +81,27 @@ def _layout_key(value: Any) -> tuple:
 
 def _words(value: Any) -> list[int]:
     """The words of a value, as the compiler lays them out."""
-    if value is None:
-        return [0]
-    if isinstance(value, tuple):
-        return [word for part in value for word in _words(part)]
+    words: list[int] = []
+    _add_words(value, words)
+    return words
+
+
+def _add_words(value: Any, words: list[int]) -> None:
+    """Add those of a value to others."""
     if isinstance(value, np.ndarray):
         # Nobody counts who holds the array, so it has neither a counter nor a parent.
-        return [0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
-    if isinstance(value, (float, np.floating)):
-        return [int(np.float64(value).view(np.int64))]
-    if isinstance(value, (int, np.integer)) and not isinstance(value, bool):
-        return [int(value)]
-    raise TypeError(f"a record holds arrays, integers and floats, not {type(value).__name__}")
+        words += (0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides)
+    elif isinstance(value, tuple):
+        for part in value:
+            _add_words(part, words)
+    elif isinstance(value, (float, np.floating)):
+        words.append(int(np.float64(value).view(np.int64)))
+    elif isinstance(value, (int, np.integer)) and not isinstance(value, bool):
+        words.append(int(value))
+    elif value is None:
+        words.append(0)
+    else:
+        raise TypeError(f"a record holds arrays, integers and floats, not {type(value).__name__}")
 
 
 class RecordType(types.Type):

@@ -335,15 +335,16 @@ def pairs_to_sweep(table, step, end):
         if start < least:
             least = start
     known = min(next_time(table), end)
-    places = np.empty(table.number[USED], np.int64)
+    # Few arrays: to make one for each field took as long as all else.
+    whole = np.empty((3, table.number[USED]), np.int64)
+    places = whole[0]
     for p in range(table.number[USED]):
         pair = table.pairs[p]
         if least <= known and (pair.start <= least or (pair.sweeps < MANY_SWEEPS and pair.start == pair.start)):
             places[count] = p
             count += 1
-    asked = PairsToSweep(
-        np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count), np.empty(count), np.empty(count), np.empty(count)
-    )
+    real = np.empty((4, count))
+    asked = PairsToSweep(whole[1, :count], whole[2, :count], real[0], real[1], real[2], real[3])
     for k in range(count):
         pair = table.pairs[places[k]]
         asked.a[k], asked.b[k], asked.start[k], asked.until[k] = pair.a, pair.b, pair.start, _until(pair, step, end)

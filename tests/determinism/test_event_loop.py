@@ -107,7 +107,7 @@ def test_a_loop_that_asks_for_more_memory_gives_the_same_bits() -> None:
 
 
 def test_steps_of_exact_contact_follow_each_other_without_python() -> None:
-    """A die falls, rebounds, rubs and comes to rest; Python is asked again only after so many events that somebody may wait for it."""
+    """A die falls, rebounds, rubs and comes to rest; Python is asked again only after MOST_EVENTS events, since somebody may wait."""
     scene = floor(ri.Scene())
     scene.add(ri.Body("die", ri.Shape.box(0.016), position=(0, 0, 0.1), orientation=(0.9, 0.3, 0.1, 0.2), velocity=(0.3, 0.0, 0.0)))
     run = prepare(scene, np.arange(91) / FPS)

@@ -34,7 +34,8 @@ def test_a_shape_is_compiled_once_for_each_frame() -> None:
 def test_small_shapes_are_kept_for_the_next_run_and_others_are_not_mixed_up() -> None:
     one, again = world_of(ri.Shape.box(0.2)), world_of(ri.Shape.box(0.2), velocity=(1, 0, 0))
     assert again.geometry is one.geometry and again.shapes is one.shapes
-    for other in (world_of(ri.Shape.box(0.3)), world_of(ri.Shape.box(0.2), center_of_mass=(0.0, 0.0, 0.05)), world_of(ri.Shape.sphere(0.1))):
+    moved = world_of(ri.Shape.box(0.2), center_of_mass=(0.0, 0.0, 0.05))
+    for other in (world_of(ri.Shape.box(0.3)), moved, world_of(ri.Shape.sphere(0.1))):
         assert other.geometry is not one.geometry
         assert not np.array_equal(other.size, one.size) or not np.array_equal(other.geometry.vertex, one.geometry.vertex)
 

@@ -28,7 +28,7 @@ from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE
 from rigidimpulse.collision.manifold.rounding import only_primitive
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.core.vector import copy_vector, dot
+from rigidimpulse.core.vector import cross, dot, length, scaled, subtract, turned
 
 # The point of a round cylinder that is nearest to a face is the one found, or one found a moment ago: it is that near to it,
 # relative to the radius. Where normal and axis are nearer than this sine there is none.
@@ -68,29 +68,25 @@ def _owner(first, index):
     return low
 
 
-@jit_making_arrays
+@jit
 def _edge_direction(geometry, edge, rotation, direction):
     """Unit direction (3,) of an edge in the world."""
-    tail, head, d = geometry.vertex[geometry.edge[edge, 0]], geometry.vertex[geometry.edge[edge, 1]], np.empty(3)
-    length = 0.0
-    for k in range(3):
-        d[k] = head[k] - tail[k]
-        length += d[k] * d[k]
+    d = subtract(geometry.vertex[geometry.edge[edge, 1]], geometry.vertex[geometry.edge[edge, 0]])
+    size = length(d)
     _rotated(rotation, d, direction)
     for k in range(3):
-        direction[k] /= sqrt(length)
+        direction[k] /= size
 
 
-@jit_making_arrays
+@jit
 def _cylinder_skeleton(geometry, p, rotation, normal, direction):
     """A cylinder is a face at its caps, a line with its radius at its side, and at its rims the line along them."""
-    axis = np.empty(3)
-    _rotated(rotation, geometry.frame[p, 3:6], axis)
+    axis = turned(rotation, geometry.frame[p, 3:6])
     along = dot(normal, axis)
     if 1.0 - abs(along) < ALIGNED:
         return 0.0, FACE
     if abs(along) < ALIGNED:
-        copy_vector(axis, direction)
+        direction[0], direction[1], direction[2] = axis
         return geometry.radius[p], LINE
     _cross(axis, normal, direction)
     size = sqrt(dot(direction, direction))
@@ -129,15 +125,13 @@ def _skeleton_of(geometry, p, kind, feature, is_a, rotation, normal, direction):
     return geometry.radius[_owner(geometry.edge_first, feature)], LINE
 
 
-@jit_making_arrays
+@jit
 def _rim_velocity(geometry, p, rotation, arm, outward, outward_rate, w, out):
     """r' of a point of a round cylinder, at a rim or on its side, into out. False where it is touched elsewhere.
 
     arm (3,): from the centre of mass; outward (3,): from the partner to the body.
     """
-    k, centre = np.empty(3), np.empty(3)
-    _rotated(rotation, geometry.frame[p, 3:6], k)
-    _rotated(rotation, geometry.frame[p, 0:3], centre)
+    k, centre = turned(rotation, geometry.frame[p, 3:6]), turned(rotation, geometry.frame[p, 0:3])
     radius, along = geometry.radius[p], 0.0
     for i in range(3):
         along += (arm[i] - centre[i]) * k[i]
@@ -147,15 +141,13 @@ def _rim_velocity(geometry, p, rotation, arm, outward, outward_rate, w, out):
     if s2 < LEAST_LEAN * LEAST_LEAN:
         return False
     s, off = sqrt(s2), 0.0
-    c = centre
+    c = centre[0] + along * k[0], centre[1] + along * k[1], centre[2] + along * k[2]
     for i in range(3):
-        c[i] += along * k[i]
         off += (arm[i] - c[i] + radius * (outward[i] - z * k[i]) / s) ** 2
     # The contact found must be the point of the rim that the formula describes.
     if off > (NEAR * radius) ** 2:
         return False
-    k_rate = np.empty(3)
-    _cross(w, k, k_rate)
+    k_rate = cross(w, k)
     _cross(w, c, out)
     z_rate = dot(outward_rate, k) + dot(outward, k_rate)
     for i in range(3):
@@ -201,38 +193,33 @@ def _on_face(geometry, p, rotation, body_velocity, side, arm, out, place):
         place[k] = side.velocity[k] - side.radius * outward_rate[k]
 
 
-@jit_making_arrays
+@jit
 def _between_lines(first, second, n, distance, place, normal_rate):
     """Two crossing lines: n' turns with both, and their crossing runs along both. False if they are parallel."""
     va, wa, ea, ra = first.velocity, first.spin, first.direction, first.radius
     vb, wb, eb = second.velocity, second.spin, second.direction
-    x = np.empty(3)
     cosine = dot(ea, eb)
     determinant = 1.0 - cosine * cosine
     if determinant < PARALLEL * PARALLEL:
         return False
-    _cross(wa, ea, x)
-    ca = -dot(n, x)
-    _cross(wb, eb, x)
-    cb = -dot(n, x)
+    ca, cb = -dot(n, cross(wa, ea)), -dot(n, cross(wb, eb))
     alpha, beta = (ca - cosine * cb) / determinant, (cb - cosine * ca) / determinant
     across = dot(vb, n) - dot(va, n)
     for k in range(3):
         normal_rate[k] = alpha * ea[k] + beta * eb[k]
-        # The part of the relative velocity of the lines' points that they have to run for.
-        x[k] = vb[k] - va[k] - across * n[k] - distance * normal_rate[k]
+    # The part of the relative velocity of the lines' points that they have to run for.
+    x = subtract(subtract(subtract(vb, va), scaled(n, across)), scaled(normal_rate, distance))
     run = (dot(x, ea) - cosine * dot(x, eb)) / determinant
     for k in range(3):
         place[k] = va[k] + run * ea[k] + ra * normal_rate[k]
     return True
 
 
-@jit_making_arrays
+@jit
 def _between_skeletons(first, second, n, distance, place, normal_rate):
     """Points and lines with a rounding."""
     va, wa, ea, ra, skeleton_a = first.velocity, first.spin, first.direction, first.radius, first.skeleton
     vb, wb, eb, rb, skeleton_b = second.velocity, second.spin, second.direction, second.radius, second.skeleton
-    x = np.empty(3)
     if skeleton_a == LINE and skeleton_b == LINE and _between_lines(first, second, n, distance, place, normal_rate):
         return
     across = dot(vb, n) - dot(va, n)
@@ -240,22 +227,21 @@ def _between_skeletons(first, second, n, distance, place, normal_rate):
         # Two points: n turns with the part of their relative velocity across it.
         normal_rate[k] = (vb[k] - va[k] - across * n[k]) / distance
     if skeleton_a == LINE or skeleton_b == LINE:
-        e = ea if skeleton_a == LINE else eb
-        _cross(wa if skeleton_a == LINE else wb, e, x)
+        e, w = (ea, wa) if skeleton_a == LINE else (eb, wb)
         # A line stays across n: n'.e = -n.(w x e).
-        change = -dot(n, x) - dot(normal_rate, e)
+        change = -dot(n, cross(w, e)) - dot(normal_rate, e)
         for k in range(3):
             normal_rate[k] += change * e[k]
     for k in range(3):
         place[k] = va[k] + ra * normal_rate[k] if skeleton_a == POINT else vb[k] - rb * normal_rate[k]
 
 
-@jit_making_arrays
-def _place_velocity(geometry, primitives, rotation, bodies, contacts, c, features, rates):
-    """p' and n' of contact c, into rates; features: kind, and the features of both bodies."""
-    (pa, pb), (kind, feature_a, feature_b), (place, normal_rate) = primitives, features, rates
+@jit
+def _place_velocity(geometry, primitives, rotation, bodies, contacts, c, features, memory):
+    """p' and n' of contact c, into the first two rows of memory (8, 3); features: kind, and the features of both bodies."""
+    (pa, pb), (kind, feature_a, feature_b), place, normal_rate = primitives, features, memory[0], memory[1]
     a, b, n = contacts.body_a[c], contacts.body_b[c], contacts.normal[c]
-    ea, eb, va, vb, outward_rate = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    ea, eb, va, vb, outward, outward_rate = memory[2], memory[3], memory[4], memory[5], memory[6], memory[7]
     flat_a = pa >= 0 and geometry.kind[pa] == HALF_SPACE
     flat_b = pb >= 0 and geometry.kind[pb] == HALF_SPACE
     ra, skeleton_a = (0.0, FACE) if flat_a else _skeleton_of(geometry, pa, kind, feature_a, True, rotation[a], n, ea)
@@ -271,15 +257,16 @@ def _place_velocity(geometry, primitives, rotation, bodies, contacts, c, feature
     elif skeleton_b == FACE:
         _cross(bodies.angular_velocity[b], n, normal_rate)
         for k in range(3):
-            outward_rate[k] = -normal_rate[k]
-        _on_face(geometry, pa, rotation[a], bodies.velocity[a], first, contacts.arm_a[c], (-n, outward_rate), place)
+            outward[k], outward_rate[k] = -n[k], -normal_rate[k]
+        _on_face(geometry, pa, rotation[a], bodies.velocity[a], first, contacts.arm_a[c], (outward, outward_rate), place)
     elif ra + rb > 0.0 and skeleton_a != UNKNOWN and skeleton_b != UNKNOWN:
         _between_skeletons(first, second, n, distance, place, normal_rate)
     elif not (skeleton_a == LINE and skeleton_b == LINE and _between_lines(first, second, n, distance, place, normal_rate)):
         # Sharp corners: half of both.
-        _cross(0.5 * (bodies.angular_velocity[a] + bodies.angular_velocity[b]), n, normal_rate)
         for k in range(3):
             place[k] = 0.5 * (va[k] + vb[k])
+            outward_rate[k] = 0.5 * (bodies.angular_velocity[a, k] + bodies.angular_velocity[b, k])
+        _cross(outward_rate, n, normal_rate)
 
 
 class Motion(NamedTuple):
@@ -298,16 +285,17 @@ class Motion(NamedTuple):
 def contact_motion(geometry, shape_of_body, rotation, bodies, contacts, kinds, features):
     """The `Motion` of m contacts; kinds (m,) and features (m, 2) name what is in contact, as in `collision.distance.simplices`."""
     m = contacts.gap.shape[0]
-    turning, fastest = np.zeros((m, 3)), 0.0
-    rate_a, rate_b, normal_rate = np.empty((m, 3)), np.empty((m, 3)), np.empty((m, 3))
-    place, u, x = np.empty(3), np.empty(3), np.empty(3)
+    rates, memory, fastest = np.zeros((4, m, 3)), np.empty((10, 3)), 0.0
+    turning, rate_a, rate_b, normal_rate = rates[0], rates[1], rates[2], rates[3]
+    place, u, x = memory[0], memory[8], memory[9]
     for c in range(m):
         n = contacts.normal[c]
         a, b = contacts.body_a[c], contacts.body_b[c]
         primitives = only_primitive(geometry, shape_of_body[a]), only_primitive(geometry, shape_of_body[b])
         at_contact = kinds[c], features[c, 0], features[c, 1]
-        _place_velocity(geometry, primitives, rotation, bodies, contacts, c, at_contact, (place, normal_rate[c]))
-        u[:] = 0.0
+        _place_velocity(geometry, primitives, rotation, bodies, contacts, c, at_contact, memory)
+        for k in range(3):
+            u[k], normal_rate[c, k] = 0.0, memory[1, k]
         for side in range(2):
             i = contacts.body_b[c] if side else contacts.body_a[c]
             r = contacts.arm_b[c] if side else contacts.arm_a[c]

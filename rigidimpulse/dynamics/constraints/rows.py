@@ -56,43 +56,34 @@ class ContactRows(NamedTuple):
 @jit_making_arrays
 def make_rows(r):
     """Return r rows, all of them FREE and hard, with no impulse."""
-    return Rows(
-        np.full(r, -1, np.int64),
-        np.full(r, -1, np.int64),
-        np.zeros((r, 12)),
-        np.zeros(r),
-        np.zeros(r, np.int64),
-        np.zeros(r, np.int64),
-        np.zeros(r),
-        np.full(r, -inf),
-        np.full(r, inf),
-        np.zeros(r),
-        np.zeros(r),
-    )
+    # Few arrays: for a body or two, to make one for each field took as long as to write it.
+    whole, real = np.zeros((4, r), np.int64), np.zeros((6, r))
+    first, second, kind, master = whole[0], whole[1], whole[2], whole[3]
+    bias, coefficient, lower, upper, softness, impulse = real[0], real[1], real[2], real[3], real[4], real[5]
+    for i in range(r):
+        first[i], second[i], lower[i], upper[i] = -1, -1, -inf, inf
+    return Rows(first, second, np.zeros((r, 12)), bias, kind, master, coefficient, lower, upper, softness, impulse)
 
 
 @jit
-def cholesky_3(a, c):
-    """Lower factor c of a symmetric positive (3, 3)."""
-    c[0, 0] = sqrt(a[0, 0])
-    c[1, 0] = a[1, 0] / c[0, 0]
-    c[1, 1] = sqrt(a[1, 1] - c[1, 0] * c[1, 0])
-    c[2, 0] = a[2, 0] / c[0, 0]
-    c[2, 1] = (a[2, 1] - c[2, 0] * c[1, 0]) / c[1, 1]
-    c[2, 2] = sqrt(a[2, 2] - c[2, 0] * c[2, 0] - c[2, 1] * c[2, 1])
-    c[0, 1] = c[0, 2] = c[1, 2] = 0.0
+def cholesky_3(a):
+    """The numbers c00, c10, c11, c20, c21, c22 of the lower factor of a symmetric positive (3, 3)."""
+    c00 = sqrt(a[0, 0])
+    c10 = a[1, 0] / c00
+    c11 = sqrt(a[1, 1] - c10 * c10)
+    c20 = a[2, 0] / c00
+    c21 = (a[2, 1] - c20 * c10) / c11
+    return c00, c10, c11, c20, c21, sqrt(a[2, 2] - c20 * c20 - c21 * c21)
 
 
-@jit_making_arrays
+@jit
 def write_body(bodies, i, line, direction, torque):
     """Write half a row, line (6,): a linear and an angular direction (tuples), scaled by the mass of body i."""
     (x, y, z), (tx, ty, tz) = direction, torque
-    factor = np.empty((3, 3))
-    cholesky_3(bodies.inv_inertia[i], factor)
+    c00, c10, c11, c20, c21, c22 = cholesky_3(bodies.inv_inertia[i])
     root = sqrt(bodies.inv_mass[i])
     line[0], line[1], line[2] = root * x, root * y, root * z
-    for k in range(3):
-        line[3 + k] = tx * factor[0, k] + ty * factor[1, k] + tz * factor[2, k]
+    line[3], line[4], line[5] = tx * c00 + ty * c10 + tz * c20, ty * c11 + tz * c21, tz * c22
 
 
 @jit
@@ -233,16 +224,15 @@ def multiply_transposed(rows, p, out):
                 out[b, k] += jacobian[i, 6 + k] * size
 
 
-@jit_making_arrays
+@jit
 def scaled_wrench(bodies, i, y, wrench):
     """Add C^-T y, the linear and angular impulse on body i that y = (Jh^T p)_i (6,) stands for, to wrench (6,)."""
-    factor = np.empty((3, 3))
     root = sqrt(bodies.inv_mass[i])
-    cholesky_3(bodies.inv_inertia[i], factor)
+    c00, c10, c11, c20, c21, c22 = cholesky_3(bodies.inv_inertia[i])
     # C^-T by back substitution: the angular part of C is a Cholesky factor.
-    z = y[5] / factor[2, 2]
-    x1 = (y[4] - factor[2, 1] * z) / factor[1, 1]
-    x0 = (y[3] - factor[1, 0] * x1 - factor[2, 0] * z) / factor[0, 0]
+    z = y[5] / c22
+    x1 = (y[4] - c21 * z) / c11
+    x0 = (y[3] - c10 * x1 - c20 * z) / c00
     for k in range(3):
         wrench[k] += y[k] / root
     wrench[3] += x0
@@ -250,16 +240,14 @@ def scaled_wrench(bodies, i, y, wrench):
     wrench[5] += z
 
 
-@jit_making_arrays
+@jit
 def scaled_change(bodies, i, y, linear, angular):
     """C y of body i: the change of its velocity by impulses p with y = (Jh^T p)_i (6,), into linear and angular (3,)."""
-    factor = np.empty((3, 3))
     root = sqrt(bodies.inv_mass[i])
-    cholesky_3(bodies.inv_inertia[i], factor)
+    c00, c10, c11, c20, c21, c22 = cholesky_3(bodies.inv_inertia[i])
     for j in range(3):
-        linear[j], angular[j] = root * y[j], 0.0
-        for t in range(3):
-            angular[j] += factor[j, t] * y[3 + t]
+        linear[j] = root * y[j]
+    angular[0], angular[1], angular[2] = c00 * y[3], c10 * y[3] + c11 * y[4], c20 * y[3] + c21 * y[4] + c22 * y[5]
 
 
 @jit_making_arrays

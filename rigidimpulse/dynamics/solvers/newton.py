@@ -230,7 +230,7 @@ class Factored(NamedTuple):
     elimination: Elimination
     blocks: np.ndarray  # (num_blocks, 6, 6) factors
     pivots: np.ndarray  # (n, 6)
-    slope: np.ndarray  # (r, 3) of which they are; no numbers before the first time
+    slope: np.ndarray  # (r, 3) of which they are; not a number before the first time
     right: np.ndarray  # (12,) working memory
 
 
@@ -261,10 +261,9 @@ def _factor_again(rows, factored, slope):
 
 
 @jit_making_arrays
-def _search(n, count):
-    """Working memory for `count` rows of n bodies."""
-    change, trial, residual, step = np.empty((n, 6)), np.empty((n, 6)), np.empty((n, 6)), np.empty((n, 6))
-    return Search(change, trial, residual, step, np.empty(count), np.empty(count), np.empty((count, 3)))
+def _search(of_bodies, of_rows, count):
+    """Working memory for `count` rows of n bodies, of (4, n, 6) and (2, count)."""
+    return Search(of_bodies[0], of_bodies[1], of_bodies[2], of_bodies[3], of_rows[0], of_rows[1], np.empty((count, 3)))
 
 
 @jit
@@ -324,9 +323,11 @@ def rounding_floor(rows, weight, p):
 @jit_making_arrays
 def prepare(rows, n):
     """What a solver of these rows of n movable bodies needs, `Factored`: the same for other biases, bounds and impulses."""
-    elimination = plan_elimination(rows.first, rows.second, n)
-    unknown = np.full((rows.bias.shape[0], 3), np.nan)
-    return Factored(elimination, np.empty((elimination.num_blocks, 6, 6)), np.empty((n, 6), np.int64), unknown, np.empty(12))
+    elimination, count = plan_elimination(rows.first, rows.second, n), rows.bias.shape[0]
+    known, right = np.empty((count, 3)), np.empty(12)
+    for i in range(count):
+        known[i, 0] = np.nan
+    return Factored(elimination, np.empty((elimination.num_blocks, 6, 6)), np.empty((n, 6), np.int64), known, right)
 
 
 @jit_making_arrays
@@ -342,10 +343,13 @@ def solve_newton(rows, n, target):
 def solve_prepared(rows, factored, target):
     """The same with what `prepare` made of rows between the same bodies, along the same directions."""
     n, count = factored.pivots.shape[0], rows.bias.shape[0]
-    weight = np.empty(count)
+    # Few arrays: for a body or two, to make one for each took as long as a step of the search.
+    of_bodies, of_rows = np.empty((5, n, 6)), np.empty((8, count))
+    y, search = of_bodies[4], _search(of_bodies, of_rows, count)
+    weight, u, r, trial, q, frozen = of_rows[2], of_rows[3], of_rows[4], of_rows[5], of_rows[6], of_rows[7]
     row_weights(rows, weight)
-    y, u, r = np.empty((n, 6)), np.empty(count), np.empty(count)
-    trial, q, frozen, search = rows.impulse.copy(), rows.impulse.copy(), np.full(count, -1.0), _search(n, count)
+    copy_vector(rows.impulse, trial)
+    copy_vector(rows.impulse, q)
     _velocities(rows, q, y, u)
     best, largest = natural_residual(rows, u, q, weight), _largest(q)
     k, free_k, failures, stagnant, idle, previous, convex = REGULARISATION_START, REGULARISATION_FREE, 0, 0, 0, best, False

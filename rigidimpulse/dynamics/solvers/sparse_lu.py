@@ -35,20 +35,18 @@ class Elimination(NamedTuple):
 @jit_making_arrays
 def plan_elimination(first, second, n):
     """Return the `Elimination` of n bodies; constraint i joins bodies first[i] and second[i], either may be -1."""
-    joined = np.zeros((n, n), np.bool_)
+    # Few arrays: for a body or two, to make one for each took longer than to plan.
+    marks, places = np.zeros((n + 1, n), np.bool_), np.zeros((3, n + 1), np.int64)
+    joined, gone, start, order, degree = marks[:n], marks[n], places[0], places[1, :n], places[2, :n]
     for i in range(first.shape[0]):
         if first[i] >= 0 and second[i] >= 0 and first[i] != second[i]:
             joined[first[i], second[i]] = joined[second[i], first[i]] = True
-    degree = np.zeros(n, np.int64)
     for i in range(n):
         for j in range(n):
             if joined[i, j]:
                 degree[i] += 1
     slot = np.full((n, n), -1, np.int64)
-    order = np.empty(n, np.int64)
-    start = np.zeros(n + 1, np.int64)
     later = np.empty(n, np.int64)
-    gone = np.zeros(n, np.bool_)
     count = np.int64(0)
     for k in range(n):
         # Least degree first; ties go to the lower index, so that the order is the same in every run.

@@ -60,6 +60,8 @@ NONE = np.zeros(0, np.int64)
 FIRST_REPORTS = 256
 PATIENCE = 600.0
 """s, after which a process that said it would compile the kernel is not waited for any more."""
+COMPILED: set[str] = set()
+"""Layouts of records for which this process has found the kernel compiled."""
 EFFECTS = {
     FIND: ("contact detection",),
     SWEEP: ("impact time",),
@@ -139,7 +141,10 @@ class CompiledLoop:
 
     def is_compiled(self) -> bool:
         """Whether the kernel is in the cache for records of this layout."""
-        return self._note().exists()
+        layout = self._record.layout_name
+        if layout not in COMPILED and self._note().exists():
+            COMPILED.add(layout)
+        return layout in COMPILED
 
     def begin_compiling(self) -> bool:
         """Say that the kernel is being compiled; returns False if somebody has said so a short while ago, or if no cache would keep it."""

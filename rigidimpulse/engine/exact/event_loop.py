@@ -420,7 +420,9 @@ def _touch(loop, found, order, time):
 
 @jit_making_arrays
 def _part(touch, first, last):
-    """The contacts from `first` to `last` - 1, in copies: the approach of each island is measured for itself."""
+    """The contacts from `first` to `last` - 1; all of them themselves, else copies."""
+    if last - first == len(touch.live):
+        return touch
     which = np.empty(last - first, np.int64)
     for c in range(first, last):
         which[c - first] = c
@@ -429,8 +431,10 @@ def _part(touch, first, last):
 
 @jit_making_arrays
 def _chosen(touch, which):
-    """Copies of some contacts (k,)."""
+    """Some contacts (k,), in ascending order: all of them themselves, else copies."""
     m = len(which)
+    if m == len(touch.live):
+        return touch
     kind, feature, place, margin = np.empty(m, np.int64), np.empty((m, 2), np.int64), np.empty(m, np.int64), np.empty(m)
     speeds, live = np.empty((2, m)), np.empty(m, np.bool_)
     for s in range(m):
