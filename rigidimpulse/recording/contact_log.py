@@ -214,12 +214,14 @@ class ContactLog:
 
     def _count(self, rows: np.ndarray, end: np.ndarray) -> None:
         """Account for the impulses of contacts that carried their forces until `end` (k,); forces of a pair in a stretch act together."""
+        if not len(rows):
+            return
         order = np.lexsort((rows["place"], rows["body_b"], rows["body_a"]))
         rows, end = rows[order], end[order]
         of_pair = np.zeros(len(rows), np.int64)
         for name in ("body_a", "body_b", "place"):
             of_pair[1:] |= np.diff(rows[name]) != 0
-        first, of_pair = np.flatnonzero(np.append(1, of_pair[1:])[: len(rows)]), np.cumsum(of_pair)
+        first, of_pair = np.flatnonzero(np.append(1, of_pair[1:])), np.cumsum(of_pair)
         force = np.stack([np.bincount(of_pair, rows["force"][:, k], len(first)) for k in range(3)], axis=1)
         rows = rows[first]
         self._accounts.add_many("contact with", rows["body_a"], rows["body_b"], rows["start"], end[first], force)

@@ -302,7 +302,7 @@ def _triangles(primitive: Primitive) -> np.ndarray:
     return np.asarray(primitive.faces) if len(primitive.faces) else np.array([[0, last, last]])
 
 
-def scale_of(shapes: list[CompiledShape]) -> float:
+def scale_of(shapes: Sequence[CompiledShape]) -> float:
     """Return the power of two that makes the smallest triangle a large one."""
     sizes = [1.0]
     for primitive in (primitive for shape in shapes for primitive in shape.primitives if primitive.kind == ROUND):

@@ -14,6 +14,7 @@ scaled so that no triangle is small. FCL's answers are used as follows:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import fcl
@@ -48,7 +49,7 @@ class TriangleTrees:
 
     """
 
-    def __init__(self, shapes: list[CompiledShape], geometry: Geometry) -> None:
+    def __init__(self, shapes: Sequence[CompiledShape], geometry: Geometry) -> None:
         """Nothing is built yet."""
         self.geometry = geometry
         self._scale = scale_of(shapes)

@@ -5,6 +5,7 @@ Source: Ericson, Real-Time Collision Detection, 2005, section 5.1.5 (nearest poi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import inf
 from typing import NamedTuple
@@ -24,7 +25,7 @@ ON_FACE = TOLERANCES.manifold.on_face
 NUDGE = TOLERANCES.manifold.nudge
 
 
-def solid_geometry(shapes: list[CompiledShape]) -> Geometry:
+def solid_geometry(shapes: Sequence[CompiledShape]) -> Geometry:
     """Geometry of compiled shapes with a prism of SIDES sides in the place of each cylinder."""
     solids = [
         replace(shape, primitives=tuple(_prism(p) if p.kind == CYLINDER else p for p in shape.primitives)) for shape in shapes

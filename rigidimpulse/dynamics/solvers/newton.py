@@ -157,11 +157,10 @@ def _assemble(rows, slope, slot, blocks, right, n):
         if here == 0.0 and partner == 0.0 and master == 0.0:
             continue
         other = i + 1 if kinds[i] == DISC else (i - 1 if kinds[i] == DISC_SECOND else i)
-        above = masters[i]
-        for k in range(12):
+        above, a, b = masters[i], rows.first[i], rows.second[i]
+        for k in range(0 if a >= 0 else 6, 12 if b >= 0 else 6):
             # A row of (-dp/du) Jh: the row itself, its partner in the disc, and its master.
             right[k] = here * jacobian[i, k] + partner * jacobian[other, k] + master * jacobian[above, k]
-        a, b = rows.first[i], rows.second[i]
         if a >= 0:
             _add_outer(blocks, slot[a, a], jacobian, i, 0, right, 0)
         if a >= 0 and b >= 0:
