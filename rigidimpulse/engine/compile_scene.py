@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.core.quaternion import from_matrix, multiply, rotate
+from rigidimpulse.core.quaternion import multiply, rotate
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.forces.constant import ConstantForce, push_of_forces
 from rigidimpulse.engine.compile_shapes import compile_shapes, world_boxes
@@ -112,8 +112,7 @@ def compile_forces(world: World, fastened: Sequence[tuple[World, Sequence[Force]
 def _start(bodies: list[Body], masses: list[BodyMass]) -> dict[str, Any]:
     """Centres of mass and principal axes in the body frames, where these are and how they move at the start; see `World`."""
     offset = np.array([m.center_of_mass for m in masses], float).reshape(-1, 3)
-    turns = {key: from_matrix(m.axes) for key, m in {id(m): m for m in masses}.items()}
-    turn = np.array([turns[id(m)] for m in masses], float).reshape(-1, 4)
+    turn = np.array([m.turn for m in masses], float).reshape(-1, 4)
     origin = np.array([body.position for body in bodies], float).reshape(-1, 3)
     orientation = np.array([body.unit_orientation() for body in bodies], float).reshape(-1, 4)
     return {

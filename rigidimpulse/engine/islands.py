@@ -65,7 +65,7 @@ def _islands(run: Run, pair_events: PairEvents, time: float, reached: np.ndarray
         make_island(run, pair_events, time, order[i:j], joints[owner_of_joint == o], tied[root[tied] == o])
         for o, i, j in zip(owners.tolist(), first.tolist(), last.tolist(), strict=True)
     ]
-    if len(alone := tied[~np.isin(root[tied], owners)]):
+    if len(tied) and len(alone := tied[~np.isin(root[tied], owners)]):
         now = run.state.now
         islands.append(island_without_contacts(time, alone, now.velocity[alone], now.angular_velocity[alone]))
     return islands
@@ -95,8 +95,9 @@ def make_island(run: Run, pair_events: PairEvents, time: float, rows: np.ndarray
         angular_velocity=state.now.angular_velocity[members],
         joints=joints,
     )
-    mark_live(pair_events.table.pairs, place, contacts.gap, time, island.live)
-    classify(run, island)
+    if m:
+        mark_live(pair_events.table.pairs, place, contacts.gap, time, island.live)
+        classify(run, island)
     return island
 
 
@@ -109,7 +110,8 @@ def _touching(run: Run, rows: np.ndarray) -> Touching:
 def _contacts(run: Run, rows: np.ndarray) -> Contacts:
     """The contacts in the rows (m,) of the buffers."""
     world, contacts, buffers = run.world, empty_contacts(len(rows)), run.finder.found.buffers
-    fill_contacts(run.state.now, buffers.real, buffers.integer, rows, world.material_of_body, world.coefficients, contacts)
+    if len(rows):
+        fill_contacts(run.state.now, buffers.real, buffers.integer, rows, world.material_of_body, world.coefficients, contacts)
     return contacts
 
 
@@ -151,7 +153,8 @@ def near_contacts(run: Run, pair_events: PairEvents, members: np.ndarray, time: 
 def forces_of(run: Run, contacts: Contacts, touching: Touching) -> np.ndarray:
     """Forces (m, 3) N that contacts carry until now, in their frames."""
     force = np.empty((len(contacts.gap), 3))
-    read_forces(run.state.memory, run.state.trajectory.start, contacts, touching, force)
+    if len(force):
+        read_forces(run.state.memory, run.state.trajectory.start, contacts, touching, force)
     return force
 
 

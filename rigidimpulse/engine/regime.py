@@ -76,13 +76,12 @@ def why_not_substepped(world: World) -> str:
     return f"all bodies rebound by more than {REBOUND}" if elastic else ""
 
 
-def may_begin(world: World, joined: np.ndarray, solve_count: np.ndarray) -> bool:
-    """Whether an island may begin to be sub-stepped at the start of a step; joined (n,) bool: bodies with joints.
+def may_begin(most: float, joined: np.ndarray, solve_count: np.ndarray) -> bool:
+    """Whether an island may begin to be sub-stepped at the start of a step; most: `most_solves_of_all`, joined (n,) bool: have joints.
 
     solve_count: (n,) how often the exact solver dealt with each body in the last step; with those that have joints, in the mean of steps.
     """
-    costly = float(solve_count.sum()) > most_solves_of_all(world)
-    return costly or bool(np.any(joined & (SMALL * solve_count > EXPENSIVE_JOINTED)))
+    return float(solve_count.sum()) > most or bool(np.any(joined & (SMALL * solve_count > EXPENSIVE_JOINTED)))
 
 
 def most_solves_of_all(world: World) -> float:

@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rigidimpulse.core.quaternion import from_matrix, multiply, to_matrix
+from rigidimpulse.core.quaternion import multiply, to_matrix
 from rigidimpulse.motion import free_rotation
 from rigidimpulse.scene.mass import BodyMass, masses_of
 
@@ -171,7 +171,7 @@ class _Walk:
 
     def _body_at(self, i: int, frame: int) -> _Body:
         run, body, mass = self.run, self.bodies[i], self.masses[i]
-        orientation = multiply(run.orientations[frame, i], from_matrix(mass.axes))
+        orientation = multiply(run.orientations[frame, i], mass.turn)
         gravity = body.gravity_factor * self.gravity if body.motion == "dynamic" else np.zeros(3)
         return _Body(
             mass, float(run.times[frame]), gravity, run.centers[frame, i], np.ascontiguousarray(orientation),

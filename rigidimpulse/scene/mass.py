@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.portable import matmul
+from rigidimpulse.core.quaternion import from_matrix
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.solid import parallel_axes
@@ -24,7 +26,8 @@ _JACOBI_SWEEPS = 30  # convergence is quadratic: 4 to 6 sweeps are enough for an
 _JACOBI_CONVERGED = TOLERANCES.inertia.jacobi_converged
 
 
-class BodyMass(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class BodyMass:
     """Mass properties of a body, and its principal frame: x_body = center_of_mass + axes @ x_principal."""
 
     mass: float  # kg; inf if the body is not dynamic
@@ -32,6 +35,16 @@ class BodyMass(NamedTuple):
     inertia: np.ndarray  # (3, 3) kg m^2, about the centre of mass, body axes; inf on the diagonal if not dynamic
     moments: np.ndarray  # (3,) kg m^2, about the principal axes, in the order of the columns of `axes`
     axes: np.ndarray  # (3, 3) proper rotation, its columns are the principal axes in the body frame
+
+    @cached_property
+    def turn(self) -> np.ndarray:
+        """(4,) quaternion of the axes."""
+        return from_matrix(self.axes)
+
+
+MOST_KNOWN: int = 1000
+"""Bodies whose masses are kept for those that are alike, also of the next scenes."""
+_KNOWN: dict[tuple, BodyMass] = {}
 
 
 def body_mass(body: Body) -> BodyMass:
@@ -56,14 +69,16 @@ def body_mass(body: Body) -> BodyMass:
 
 def masses_of(bodies: Iterable[Body]) -> list[BodyMass]:
     """Return the mass properties of bodies, the same for those that are alike; errors are those of `body_mass`."""
-    known: dict[tuple, BodyMass] = {}
     masses = []
     for body in bodies:
         given = (None if value is None else np.asarray(value, float).tobytes() for value in (body.mass, body.inertia, body.center_of_mass))
         key = (body.shape.key, body.motion, body.becomes_dynamic, body.material.density, *given)
-        if key not in known:
-            known[key] = body_mass(body)
-        masses.append(known[key])
+        mass = _KNOWN.get(key)
+        if mass is None:
+            if len(_KNOWN) >= MOST_KNOWN:
+                _KNOWN.clear()
+            mass = _KNOWN[key] = body_mass(body)
+        masses.append(mass)
     return masses
 
 
@@ -93,7 +108,7 @@ def _dynamic_mass(body: Body) -> BodyMass:
     given = (body.mass is not None, body.inertia is not None, body.center_of_mass is not None)
     if all(given):
         body.shape.check()
-        mass, center, tensor = float(body.mass), np.asarray(body.center_of_mass, float), None  # type: ignore[arg-type]
+        mass, center, tensor = float(body.mass), np.array(body.center_of_mass, float), None  # type: ignore[arg-type]
     else:
         try:
             solid = body.shape.solid()
@@ -102,7 +117,7 @@ def _dynamic_mass(body: Body) -> BodyMass:
             remedy = f"{error.remedy}, or give {', '.join(name + '=' for name in missing)}"
             raise SceneError(error.problem, remedy, error.where) from None
         mass = solid.volume * float(body.material.density) if body.mass is None else float(body.mass)
-        center = solid.centroid if body.center_of_mass is None else np.asarray(body.center_of_mass, dtype=np.float64)
+        center = solid.centroid if body.center_of_mass is None else np.array(body.center_of_mass, dtype=np.float64)
         tensor = mass / solid.volume * parallel_axes(solid.inertia, solid.volume, center - solid.centroid)
     if body.inertia is not None:
         tensor = _given_inertia(np.asarray(body.inertia, dtype=np.float64))
@@ -120,7 +135,7 @@ def _frame_origin(body: Body) -> np.ndarray:
     if body.motion == "static":
         return np.zeros(3)
     if body.center_of_mass is not None:
-        return np.asarray(body.center_of_mass, dtype=np.float64)
+        return np.array(body.center_of_mass, dtype=np.float64)
     try:
         return body.shape.solid().centroid
     except SceneError:

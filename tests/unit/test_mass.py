@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from rigidimpulse.core.errors import SceneError
+from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.scene.body import Body
-from rigidimpulse.scene.mass import body_mass, principal_axes
+from rigidimpulse.scene.mass import MOST_KNOWN, body_mass, masses_of, principal_axes
 from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.shape import Shape, rotation_matrix
 
@@ -247,3 +248,22 @@ def test_principal_axes_of_a_plate_with_equal_diagonal():
     assert close(np.sort(moments), [0.7, 1.0, 1.3], 1e-15)
     assert np.allclose(np.abs(axes[:2, :2]), np.sqrt(0.5), rtol=1e-15)
     assert np.linalg.det(axes) == pytest.approx(1.0, rel=1e-15)
+
+
+def test_masses_that_are_kept_do_not_follow_what_the_caller_changes_later():
+    centre = np.array([0.0, 0.0, 0.1])
+    body = Body("a", Shape.box(0.5), mass=2.0, center_of_mass=centre)
+    first = masses_of([body])[0]
+    centre[2] = 0.2
+    other = masses_of([body])[0]
+    np.testing.assert_array_equal(first.center_of_mass, [0.0, 0.0, 0.1])
+    np.testing.assert_array_equal(other.center_of_mass, [0.0, 0.0, 0.2])
+    centre[2] = 0.1
+    assert masses_of([body])[0] is first
+    np.testing.assert_allclose(to_matrix(first.turn), first.axes, atol=1e-15)
+
+
+def test_more_bodies_than_are_kept_have_their_own_masses():
+    bodies = [Body(f"body {k}", Shape.sphere(0.1), mass=1.0 + k) for k in range(MOST_KNOWN + 50)]
+    assert [m.mass for m in masses_of(bodies)] == [1.0 + k for k in range(MOST_KNOWN + 50)]
+    assert [m.mass for m in masses_of(reversed(bodies))] == [1.0 + k for k in reversed(range(MOST_KNOWN + 50))]

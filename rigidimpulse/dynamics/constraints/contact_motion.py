@@ -281,6 +281,12 @@ class Motion(NamedTuple):
     """rad/s, at which the fastest arm or normal turns"""
 
 
+def no_motion() -> Motion:
+    """That of no contacts."""
+    none = np.zeros((0, 3))
+    return Motion(none, none, none, none, 0.0)
+
+
 @jit_making_arrays
 def contact_motion(geometry, shape_of_body, rotation, bodies, contacts, kinds, features):
     """The `Motion` of m contacts; kinds (m,) and features (m, 2) name what is in contact, as in `collision.distance.simplices`."""

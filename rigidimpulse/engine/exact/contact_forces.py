@@ -11,7 +11,7 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import turned
 from rigidimpulse.dynamics.constraints.contact import ContactProblem, Held
-from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
+from rigidimpulse.dynamics.constraints.contact_motion import contact_motion, no_motion
 from rigidimpulse.dynamics.constraints.joint_sub_step import UNSOLVED
 from rigidimpulse.dynamics.constraints.position_correction import Sunk, correct_positions, needs_correction
 from rigidimpulse.dynamics.constraints.rolling_friction import NO_ROLLING, Rolling, rolling_of
@@ -25,13 +25,13 @@ from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.sleeping import may_sleep
 from rigidimpulse.model.contact_memory import forget_forces, identity, keep_forces, keep_wrenches
 from rigidimpulse.model.contacts import Contacts, Touching, select
-from rigidimpulse.model.island import Island
+from rigidimpulse.model.island import Island, empty_contacts
 from rigidimpulse.motion.evaluate import refresh_pose
 
 DEPTH = TOLERANCES.manifold.depth
 PLAY = TOLERANCES.contact_forces.unsolved_energy
 NOT_SOLVED_REMEDY = "residual {value:.1e}; use a smaller step"
-NO_SUPPORTS = np.zeros(0, np.int64)
+NO_SUPPORTS, NO_MOTION = np.zeros(0, np.int64), no_motion()
 
 
 def hold(run: Run, pair_events: PairEvents, island: Island) -> None:
@@ -39,26 +39,28 @@ def hold(run: Run, pair_events: PairEvents, island: Island) -> None:
     state, number = run.state, run.world.num_bodies
     run.contact_log.close(island.members, island.time)
     run.wrench[island.members] = run.wrench_rate[island.members] = 0.0
-    forget_forces(state.memory, number, island.contacts)
     island.held = island.slow()
-    inside = leaves_from_inside(pair_events.table.pairs, island.place, island.contacts, island.held)
-    if needs_correction(island.contacts, island.held, inside, island.contact_margin):
-        _correct_positions(run, pair_events, island, inside)
+    if len(island.place):
+        forget_forces(state.memory, number, island.contacts)
+        inside = leaves_from_inside(pair_events.table.pairs, island.place, island.contacts, island.held)
+        if needs_correction(island.contacts, island.held, inside, island.contact_margin):
+            _correct_positions(run, pair_events, island, inside)
     subset = np.flatnonzero(island.held)
     if not len(subset) and not len(island.joints):
         pair_events.look_around(island.members, island.time, island.shift)
         return
-    now, constants, contacts = state.now, run.world.constants, select(island.contacts, subset)
+    now, constants, lasts = state.now, run.world.constants, len(subset) > 0
+    contacts = select(island.contacts, subset) if lasts else empty_contacts(0)
     turning, problem = _problem(run, island, subset, contacts)
     forces = Forces(forces_of(run, contacts, turning.touching), run.wrench)
-    before = kinetic_energy(now, constants, island.members)
+    before = kinetic_energy(now, constants, island.members) if lasts else 0.0
     rest, held = pair_events.end - island.time, None
     if len(island.joints):
         h, residual = _hold_jointed(run, island, problem, turning, forces, rest)
     else:
         held = _hold_contacts(run, island, problem, turning, forces, rest)
         h, residual = held.length, held.residual
-    if len(subset):
+    if lasts:
         run.log.account(island.time, "stick", kinetic_energy(now, constants, island.members) - before)
     failed = residual > UNSOLVED or (len(island.joints) > 0 and not run.joints.are_closed)
     if failed and len(island.joints) and run.substepped.may_take(island.members):
@@ -78,9 +80,10 @@ def hold(run: Run, pair_events: PairEvents, island: Island) -> None:
     # Without contact joints keep energy by themselves, up and down: what they gain they lose.
     passive = passive and (not len(island.joints) or bool(np.any(forces.force[:, 0] > 0.0)))
     note_hold(state.limiter, now, constants, contacts, island.members, supports, passive)
-    run.contact_log.replace(island.members, island.time, contacts, now.position, forces.force)
-    state.remember(len(subset))
-    keep_forces(state.memory, number, island.time, contacts, turning.touching, forces.force)
+    if lasts:
+        run.contact_log.replace(island.members, island.time, contacts, now.position, forces.force)
+        state.remember(len(subset))
+        keep_forces(state.memory, number, island.time, contacts, turning.touching, forces.force)
     if held is not None and turns(turning.motion, run.world.accuracy.step):
         keep_wrenches(state.memory, number, island.time, contacts, held.force, held.slides)
     if failed and len(island.joints):
@@ -109,7 +112,9 @@ def _other_supports(run: Run, island: Island) -> tuple[np.ndarray, bool]:
 def _problem(run: Run, island: Island, subset: np.ndarray, contacts: Contacts) -> tuple[Turning, ContactProblem]:
     """The lasting contacts of an island, which are the given subset of its contacts, as the kernels take them."""
     shapes, state, touching = run.world.compiled_shapes, run.state, Touching(*(column[subset] for column in island.touching))
-    motion = contact_motion(shapes.geometry, shapes.of_body, state.rotation, state.now, contacts, touching.kind, touching.feature)
+    motion = NO_MOTION
+    if len(subset):
+        motion = contact_motion(shapes.geometry, shapes.of_body, state.rotation, state.now, contacts, touching.kind, touching.feature)
     problem = ContactProblem(
         state.now, contacts, island.members, run.column, motion.turning, run.acceleration, run.angular_acceleration
     )

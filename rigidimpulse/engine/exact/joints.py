@@ -111,6 +111,8 @@ class JointState:
         rods = np.where(self.table.coordinate == DISTANCE, self.table.target, 0.0)
         self._rod = np.zeros(len(joints))
         np.maximum.at(self._rod, self._joint_of_row, rods)
+        self._arm = np.array([np.linalg.norm(anchor, axis=1) for anchor in (self.table.anchor_a, self.table.anchor_b)])
+        self._least_inertia = world.inertia.min(axis=1)
         limits = self._joint_of_row[(self.table.lower == 0.0) != (self.table.upper == 0.0)]
         self._has_limit = np.bincount(limits, minlength=len(joints)) > 0
         self._limited = bool(self._has_limit.any())
@@ -158,8 +160,8 @@ class JointState:
 
     def bodies_of(self, joints: np.ndarray) -> np.ndarray:
         """Bodies of the joints, without the world."""
-        both = np.unique(np.concatenate([self.table.body_a[joints], self.table.body_b[joints]]))
-        return both[both >= 0]
+        both = {*self.table.body_a[joints].tolist(), *self.table.body_b[joints].tolist()}
+        return np.array(sorted(both - {-1}), np.int64)
 
     def are_passive(self, which: np.ndarray) -> bool:
         """Whether joints are neither driven nor springs."""
@@ -167,7 +169,8 @@ class JointState:
 
     def supports_of(self, which: np.ndarray) -> np.ndarray:
         """Ends of the joints that are not dynamic, in order, -1 for the world."""
-        ends = np.unique(np.concatenate([self.table.body_a[which], self.table.body_b[which]]))
+        both = {*self.table.body_a[which].tolist(), *self.table.body_b[which].tolist()}
+        ends = np.array(sorted(both), np.int64)
         return ends[(ends < 0) | ~self._dynamic[ends]]
 
     def moving_bodies(self, run: Run) -> np.ndarray:
@@ -320,11 +323,11 @@ class JointState:
         world, table = run.world, self.table
         force, rod = np.linalg.norm(self.pull[which], axis=1), self._rod[which]
         bodies = np.concatenate([table.body_a[which], table.body_b[which]])
-        arm = np.concatenate([np.linalg.norm(anchor[which], axis=1) for anchor in (table.anchor_a, table.anchor_b)])
+        arm = self._arm[:, which].ravel()
         # A body that hangs at its centre does not sway; files of single precision miss the centre by some 1e-8.
         sways = (bodies >= 0) & world.dynamic[bodies] & (arm > CENTRED * np.tile(rod, 2))
         i, r = bodies[sways], arm[sways]
-        square = np.tile(force, 2)[sways] * (r / world.inertia[i].min(axis=1) + world.inv_mass[i] / r)
+        square = np.tile(force, 2)[sways] * (r / self._least_inertia[i] + world.inv_mass[i] / r)
         squares = np.bincount(i, square, minlength=world.num_bodies)
         swings = np.zeros(world.num_bodies, bool)
         for k in {self.movable_end(j) for j in which[self._pins[which]].tolist()}:

@@ -30,7 +30,9 @@ def record_of(world: World, frames: Frames, ledger: Ledger, by_cause: Impulses) 
         forced[by_cause.forces.body] = True
     if world.joints_of_scene:
         touched.append(np.column_stack([world.joints.body_a, world.joints.body_b]))
-    pairs = np.unique(np.concatenate(touched), axis=0)
+    # As one number each: numpy takes ten times as long to sort rows.
+    base, ends = world.num_bodies + 1, np.concatenate(touched) + 1
+    pairs = np.column_stack(np.divmod(np.unique(ends[:, 0] * base + ends[:, 1]), base)) - 1
     return RunRecord(world, frames, ledger, by_cause.release, pairs, forced, jointed(world))
 
 

@@ -151,14 +151,19 @@ class _Shapes:
         out = np.zeros(len(mine), bool)
         if not len(out):
             return out
-        corners = _Padded({shape: self.probe(shape).corners for shape in np.unique(mine).tolist()})
-        bounds = _Padded({shape: self.solid(shape).bounds for shape in np.unique(other).tolist()})
+        corners = _Padded({shape: self.probe(shape).corners for shape in _distinct(mine)})
+        bounds = _Padded({shape: self.solid(shape).bounds for shape in _distinct(other)})
         for most_corners, most_bounds, those in _kinds(corners.size[mine], bounds.size[other]):
             length = max(AT_ONCE // max(most_corners * most_bounds, 1), 1)
             for first in range(0, len(those), length):
                 here = those[first : first + length]
                 out[here] = surely_apart(corners.of(mine[here]), bounds.of(other[here]), posed.part(here))
         return out
+
+
+def _distinct(numbers: np.ndarray) -> list[int]:
+    """The numbers >= 0 that there are, in order."""
+    return np.flatnonzero(np.bincount(numbers)).tolist()
 
 
 def _kinds(first: np.ndarray, second: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:
@@ -184,7 +189,7 @@ class _Padded:
         self._place = np.zeros(len(self.size), np.int64)
         for number, array in arrays.items():
             self.size[number] = STEP * -(-len(array) // STEP)
-        for size in np.unique(self.size[list(arrays)]).tolist():
+        for size in {int(self.size[number]) for number in arrays}:
             mine = [number for number in arrays if self.size[number] == size]
             self._place[mine] = np.arange(len(mine))
             self._rows[size] = np.stack([arrays[number][np.minimum(np.arange(size), len(arrays[number]) - 1)] for number in mine])

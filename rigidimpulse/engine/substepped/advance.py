@@ -150,7 +150,7 @@ class SubsteppedIslands:
             return False
         if self.hand_over.cheapest is not None:
             return not self.hand_over.cheapest.may_begin(solve_count, int(np.count_nonzero(self._world.dynamic)), self._jointed)
-        return self._auto and not may_begin(self._world, self._jointed, solve_count)
+        return self._auto and not may_begin(self.counts.most, self._jointed, solve_count)
 
     def may_take(self, bodies: np.ndarray) -> bool:
         """Whether islands of bodies that no impulse keeps apart are handed over, see `HandOver.may_take`."""

@@ -115,7 +115,7 @@ def _add_body(spec: Any, body: PeerBody, step: float) -> None:
         added.add_freejoint()
         added.explicitinertial = True
         added.mass, added.ipos = body.mass.mass, body.mass.center_of_mass
-        added.iquat, added.inertia = from_matrix(body.mass.axes), body.mass.moments
+        added.iquat, added.inertia = body.mass.turn, body.mass.moments
     for k, part in enumerate(body.parts):
         placed = {"pos": part.position, "quat": from_matrix(part.rotation)}
         geom = added.add_geom(**placed | _geometry(spec, f"{body.body.name} {k}", part))

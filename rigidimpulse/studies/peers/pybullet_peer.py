@@ -33,7 +33,7 @@ class PybulletPeer:
         self._client = pybullet.connect(pybullet.DIRECT)
         self._bodies = bodies
         self._centre = np.array([body.mass.center_of_mass for body in bodies])
-        self._axes = np.array([from_matrix(body.mass.axes) for body in bodies])
+        self._axes = np.array([body.mass.turn for body in bodies])
         pybullet.setGravity(*gravity, physicsClientId=self._client)
         self._bouncy = any(body.restitution > DULL for body in bodies)
         bouncy = {"contactERP": 0.0} if self._bouncy else {}
