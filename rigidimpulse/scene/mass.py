@@ -17,7 +17,6 @@ import numpy as np
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.portable import matmul
-from rigidimpulse.core.quaternion import from_matrix
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.solid import parallel_axes
@@ -39,6 +38,8 @@ class BodyMass:
     @cached_property
     def turn(self) -> np.ndarray:
         """(4,) quaternion of the axes."""
+        from rigidimpulse.core.quaternion import from_matrix  # numba comes with it
+
         return from_matrix(self.axes)
 
 
