@@ -5,7 +5,7 @@ the next one where
 
     the run is at the time that it was given, or nothing moves,
     the exact regime dealt so often with the bodies in the last step that islands may begin to be sub-stepped,
-    there is no space for the pairs.
+    there is a problem to tell of, or no space for the pairs.
 """
 
 from math import floor
