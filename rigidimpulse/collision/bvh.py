@@ -2,8 +2,21 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from rigidimpulse.collision.distance.simplices import inner
 from rigidimpulse.core.vector import moved, row, subtract
+
+
+class NodeLimits(NamedTuple):
+    """What a walk through two trees looks at: gaps along normals, at the present pose and at any to which the bodies may go from there."""
+
+    reach: float  # m, greatest gap
+    far: float  # m, the same and how far points may move past each other
+    depth: float  # m, how far surfaces may be inside each other, and how far points may move
+    cosine: float  # of the angle by which the bodies may turn against each other
+    sine: float
+
 
 STACK_ROWS = 128
 """Rows of the scratch buffer used as the stack of a walk through two trees; the rest holds pairs of leaves."""
@@ -44,24 +57,27 @@ def splits_first(low_a, high_a, low_b, high_b):
 
 
 @inner
-def _normals_oppose(cone, a, b, R):
-    """Whether some n may be in the cone of node a with -n in that of node b, turned by R; cone: see `normal_cones`."""
+def _normals_oppose(cone, a, b, R, limits):
+    """Whether some n may be in the cone of node a with -n in that of node b, turned by R and a little more; cone: see `normal_cones`."""
     between = 0.0
     for i in range(3):
         between -= cone[a, i] * (R[i, 0] * cone[b, 0] + R[i, 1] * cone[b, 1] + R[i, 2] * cone[b, 2])
-    cosine = cone[a, 3] * cone[b, 3] - cone[a, 4] * cone[b, 4]
+    cosine, sine = cone[a, 3] * cone[b, 3] - cone[a, 4] * cone[b, 4], cone[a, 4] * cone[b, 3] + cone[a, 3] * cone[b, 4]
     # Two half angles of more than a half circle together leave nothing out.
-    return between >= cosine or cone[a, 4] * cone[b, 3] + cone[a, 3] * cone[b, 4] <= 0.0
+    if sine <= 0.0 or between >= cosine:
+        return True
+    turned_sine = sine * limits.cosine + cosine * limits.sine
+    return turned_sine <= 0.0 or between >= cosine * limits.cosine - sine * limits.sine
 
 
 @inner
-def _in_reach(geometry, a, b, R, t, reach, depth):
+def _in_reach(geometry, a, b, R, t, limits):
     """Whether a point of node b may be at  p + g n,  -depth <= g <= reach,  for a point p of node a with a normal n of its cone, and back.
 
     Each box is put into an upright box of the other's frame, as in `box_distance_squared`. Along each axis the way g n is bounded by the
     least and the greatest component of the normals of the cone.
     """
-    cone = geometry.node_cone
+    cone, reach, far, depth = geometry.node_cone, limits.reach, limits.far, limits.depth
     low_a, high_a = row(geometry.node_min, a), row(geometry.node_max, a)
     low_b, high_b = row(geometry.node_min, b), row(geometry.node_max, b)
     middle_a = (0.5 * (low_a[0] + high_a[0]), 0.5 * (low_a[1] + high_a[1]), 0.5 * (low_a[2] + high_a[2]))
@@ -75,7 +91,7 @@ def _in_reach(geometry, a, b, R, t, reach, depth):
         if between[k] - half > reach * max(0.0, cone[a, 8 + k]) + depth or between[k] + half < reach * min(0.0, cone[a, 5 + k]) - depth:
             return False
         squared += max(0.0, abs(between[k]) - half) ** 2
-    if squared > reach * reach:
+    if squared > far * far:
         return False
     squared = 0.0
     for k in range(3):
@@ -84,18 +100,18 @@ def _in_reach(geometry, a, b, R, t, reach, depth):
         if along_k - half > reach * max(0.0, cone[b, 8 + k]) + depth or along_k + half < reach * min(0.0, cone[b, 5 + k]) - depth:
             return False
         squared += max(0.0, abs(along_k) - half) ** 2
-    return squared <= reach * reach
+    return squared <= far * far
 
 
 @inner
-def gather_leaf_pairs(geometry, R, t, reach, depth, any_normal, pairs, stacked):
-    """Walk on from the stack in rows [0, stacked) of `pairs`, for features at gaps from -depth to `reach`, m.
+def gather_leaf_pairs(geometry, R, t, limits, any_normal, pairs, stacked):
+    """Walk on from the stack in rows [0, stacked) of `pairs`, for features within `NodeLimits`.
 
-    any_normal: keep all pairs of boxes within `reach`, those too that cannot touch by their normals. Returns (stacked, end, left out): what
-    is left of the stack, the pairs of leaves in rows [STACK_ROWS, end), and whether normals have left out boxes within `reach`.
+    any_normal: keep all pairs of boxes that are near enough, those too that cannot touch by their normals. Returns (stacked, end, left
+    out): what is left of the stack, the pairs of leaves in rows [STACK_ROWS, end), and whether normals have left out boxes near enough.
     """
     node_min, node_max, node_child, cone = geometry.node_min, geometry.node_max, geometry.node_child, geometry.node_cone
-    end, left_out = STACK_ROWS, False
+    end, left_out, far_squared = STACK_ROWS, False, limits.far * limits.far
     while stacked > 0 and end < pairs.shape[0]:
         stacked -= 1
         a = pairs[stacked, 0]
@@ -103,10 +119,10 @@ def gather_leaf_pairs(geometry, R, t, reach, depth, any_normal, pairs, stacked):
         low_a, high_a = row(node_min, a), row(node_max, a)
         low_b, high_b = row(node_min, b), row(node_max, b)
         if any_normal:
-            if box_distance_squared(low_a, high_a, low_b, high_b, R, t, reach * reach) > reach * reach:
+            if box_distance_squared(low_a, high_a, low_b, high_b, R, t, far_squared) > far_squared:
                 continue
-        elif not (_normals_oppose(cone, a, b, R) and _in_reach(geometry, a, b, R, t, reach, depth)):
-            left_out = left_out or box_distance_squared(low_a, high_a, low_b, high_b, R, t, reach * reach) <= reach * reach
+        elif not (_normals_oppose(cone, a, b, R, limits) and _in_reach(geometry, a, b, R, t, limits)):
+            left_out = left_out or box_distance_squared(low_a, high_a, low_b, high_b, R, t, far_squared) <= far_squared
             continue
         child_a = node_child[a]
         child_b = node_child[b]

@@ -9,6 +9,7 @@ import numpy as np
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.contact_points import Contacts
 from rigidimpulse.collision.manifold.dispatch import PairQuery, contacts_of_pairs
+from rigidimpulse.collision.manifold.kept_features import FEW_ROWS, MANY_PAIRS, MANY_ROWS, PLACES, make_contact_scratch
 
 CONTACT_CAPACITY, PAIR_CAPACITY = 1024, 4096
 ALL = np.int64(0)
@@ -37,14 +38,20 @@ class ContactBuffer:
     """Contacts as they are found.
 
     Attributes:
-        real: (c, 10) and integer: (c, 5), contacts, see `manifold.dispatch`. scratch: (p, 2), for the walk through two trees.
+        real: (c, 10) and integer: (c, 5), contacts, see `manifold.dispatch`. scratch: for the walk through two trees.
 
     """
 
-    def __init__(self, contacts: int = CONTACT_CAPACITY) -> None:
-        """Buffers for a small scene; contacts: that they hold at first."""
+    def __init__(self, contacts: int = CONTACT_CAPACITY, keeps: bool = False) -> None:
+        """Buffers for a small scene.
+
+        Args:
+            contacts: that they hold at first.
+            keeps: whether features that are near are kept from question to question (`kept_features`): all are about the same shapes.
+
+        """
         self.real, self.integer = np.empty((contacts, 10)), np.empty((contacts, 5), np.int64)
-        self.scratch = np.empty((PAIR_CAPACITY, 2), np.int64)
+        self.scratch = make_contact_scratch.py_func(*((MANY_PAIRS, PLACES, MANY_ROWS) if keeps else (PAIR_CAPACITY, 0, FEW_ROWS)))
 
     def find(self, question: Question) -> int:
         """Find the contacts of pairs; returns their number."""
@@ -58,7 +65,7 @@ class ContactBuffer:
         """Grow to at least `needed` contacts, and to twice the present capacity."""
         capacity = max(needed, 2 * len(self.real))
         self.real, self.integer = np.empty((capacity, 10)), np.empty((capacity, 5), np.int64)
-        self.scratch = np.empty((4 * capacity, 2), np.int64)
+        self.scratch = self.scratch._replace(pairs=np.empty((max(4 * capacity, len(self.scratch.pairs)), 2), np.int64))
 
     @property
     def contacts(self) -> Contacts:
@@ -66,9 +73,11 @@ class ContactBuffer:
         return Contacts(self.real, self.integer, self.scratch)
 
 
-def find_together(buffers: list[ContactBuffer], questions: list[Question]) -> list[int]:
-    """Numbers of contacts found for each question, each in its own buffer; on several cores."""
+def find_together(buffers: list[ContactBuffer], questions: list[Question], at_once: bool) -> list[int]:
+    """Numbers of contacts found for each question, each in its own buffer; at_once: on several cores."""
     asked = list(zip(buffers, questions, strict=True))
+    if not at_once:
+        return [buffer.find(question) for buffer, question in asked]
     counts = contacts_of_pairs.together([(*question, buffer.contacts, ALL) for buffer, question in asked])
     for k, (buffer, question) in enumerate(asked):
         if counts[k] < 0:

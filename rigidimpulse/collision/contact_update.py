@@ -15,6 +15,7 @@ from rigidimpulse.collision.contact_cache import note_seen
 from rigidimpulse.collision.contact_matching import NEAR, Points, Source, match_contacts, set_contact_margin, write_point
 from rigidimpulse.collision.contact_records import ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, SKIN
 from rigidimpulse.collision.geometry import Geometry
+from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
 from rigidimpulse.collision.manifold.inset_surface import put_back
 from rigidimpulse.collision.manifold.penetrating import gap_along, overlap_contacts, support
 from rigidimpulse.collision.manifold.polyhedra import POINTS, Polyhedra, make_scratch
@@ -26,6 +27,10 @@ from rigidimpulse.core.vector import turned_by
 
 FARTHER = 1.5
 """Distance of the search in margins: a pair without contacts is then known to be apart for some time."""
+
+
+FARTHEST = 2.5
+"""The same of the gap of meshes."""
 
 
 class SmallerShapes(NamedTuple):
@@ -88,6 +93,28 @@ def ask_general(smaller, taken_off, bodies, pairs, places, margins, order, asked
                     asked.rotation[at, j, c] = rotation[i, j, c]
             for j in range(4):
                 asked.orientation[at, j] = orientation[i, j]
+
+
+@jit_making_arrays
+def mark_apart(smaller, shape_of_body, bodies, asked, pairs, places, span, is_apart):
+    """Mark the pairs of meshes at `places` that have had no contacts and are too far apart for any, and note how far: they need no search.
+
+    A search for contacts is expensive for meshes, their gap is less so, and tells for how long there are none. asked: `Asked`, of these
+    pairs; span: (begin, end) of those that are looked at; is_apart (k,) bool: the result.
+    """
+    out = np.empty(7)
+    for k in range(span[0], span[1]):
+        p = places[k]
+        is_apart[k] = False
+        if pairs.count[p] > 0 or smaller.depth[pairs.first[p]] + smaller.depth[pairs.second[p]] == 0.0:
+            continue
+        a, b, taken_off = asked.a[k], asked.b[k], asked.shown[k] - asked.far[k]
+        posed_a = Posed(shape_of_body[a], asked.position[a], asked.rotation[a])
+        posed_b = Posed(shape_of_body[b], asked.position[b], asked.rotation[b])
+        gap = pair_gap(smaller.geometry, posed_a, posed_b, FARTHEST * asked.shown[k], out)
+        if gap > asked.shown[k]:
+            is_apart[k], pairs.apart[p] = True, gap - taken_off
+            note_seen(bodies, pairs, p)
 
 
 @jit

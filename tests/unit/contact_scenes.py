@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from rigidimpulse.collision.geometry import HALF_SPACE, ROUND, CompiledShape, Primitive, Shapes, build_geometry
 from rigidimpulse.collision.manifold.contact_points import Contacts as Buffers
 from rigidimpulse.collision.manifold.dispatch import SCRATCH_ROWS, Posed, pair_contacts, pair_gap
+from rigidimpulse.collision.manifold.kept_features import FEW_ROWS, make_contact_scratch
 from rigidimpulse.collision.manifold.reduce import reduce_contacts
 
 ROUND_OFF = 2e-14
@@ -86,7 +87,7 @@ class Scene:
 
     def __init__(self, *shapes, scratch_rows=SCRATCH_ROWS, capacity=CAPACITY):
         self.geometry = build_geometry([CompiledShape(tuple(s if isinstance(s, list) else [s])) for s in shapes])
-        self.scratch = np.empty((scratch_rows, 2), dtype=np.int64)
+        self.scratch = make_contact_scratch.py_func(scratch_rows, 0, FEW_ROWS)
         self.real = np.full((capacity, 10), np.nan)
         self.integer = np.full((capacity, 5), -7, dtype=np.int64)
         self.shapes = Shapes(self.geometry, np.arange(len(shapes)))

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from contact_scenes import L_NOTCH, Scene, approached, box, capsule, mesh, prism, random_pose, spot_like, turn
 
-from rigidimpulse.collision.bvh import STACK_ROWS, gather_leaf_pairs
+from rigidimpulse.collision.bvh import STACK_ROWS, NodeLimits, gather_leaf_pairs
 from rigidimpulse.collision.manifold.contact_points import STRICT, TILT
 from rigidimpulse.collision.manifold.mesh_edges import NEARLY_PARALLEL
 from rigidimpulse.collision.normal_cones import EDGE_SLACK, TAU, every_direction, vertex_cones
@@ -70,7 +70,8 @@ def test_cones_leave_out_three_of_four_pairs_of_leaves_of_rings():
     for scene in (WITH_CONES, WITHOUT):
         pairs, geometry = np.empty((1 << 16, 2), np.int64), scene.geometry
         pairs[0] = geometry.node_first[1]
-        counts.append(gather_leaf_pairs(geometry, hanging[1], hanging[0], 0.04, 1e-6, False, pairs, 1)[1] - STACK_ROWS)
+        limits = NodeLimits(0.04, 0.04, 1e-6, 1.0, 0.0)
+        counts.append(gather_leaf_pairs(geometry, hanging[1], hanging[0], limits, False, pairs, 1)[1] - STACK_ROWS)
     assert counts[1] > 300
     assert counts[0] < 0.25 * counts[1]
 

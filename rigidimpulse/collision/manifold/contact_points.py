@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.distance.simplices import CORNER, inner
+from rigidimpulse.collision.manifold.kept_features import ContactScratch
 from rigidimpulse.core.tolerances import TOLERANCES
 
 INSIDE = TOLERANCES.manifold.inside
@@ -71,7 +72,7 @@ class Contacts(NamedTuple):
 
     real: np.ndarray  # (c, 10) point_a (3), point_b (3), normal (3), gap; m
     integer: np.ndarray  # (c, 5) body_a, body_b (left to the caller), kind, feature_a, feature_b
-    scratch: np.ndarray  # (p, 2) int64, p > STACK_ROWS: a stack of nodes, and pairs of leaves
+    scratch: ContactScratch
 
 
 class Found(NamedTuple):

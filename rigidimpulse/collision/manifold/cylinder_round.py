@@ -112,7 +112,7 @@ def cylinder_round_contacts(geometry, cylinder, round_, pose, margin, contacts, 
     vertex, edge_kind = geometry.vertex, geometry.edge_kind
     solid = solid_of(geometry.frame, geometry.radius, cylinder, margin)
     view = _view(solid, pose.R, pose.t)
-    skeleton, stack = geometry.radius[round_], contacts.scratch
+    skeleton, stack = geometry.radius[round_], contacts.scratch.pairs
     found = Found(contacts.real, contacts.integer, count)
     stack[0, 0] = geometry.node_first[round_]
     depth = 1

@@ -53,7 +53,7 @@ from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.vector import moved, relative_pose, turned
 
 SCRATCH_ROWS = 8 * STACK_ROWS
-"""A good size of `Contacts.scratch`; it must be larger than `STACK_ROWS`."""
+"""A good number of rows of `ContactScratch.pairs`; it must be larger than `STACK_ROWS`."""
 
 BALL, POLYHEDRON, BOX = 3, 4, 5
 """Kinds of whole shapes, beside the kinds of primitives HALF_SPACE, ROUND and CYLINDER."""
@@ -300,6 +300,7 @@ def contacts_of_pairs(shapes, bodies, rotation, query, contacts, per_normal):
     for k in range(query.a.shape[0]):
         a, b = query.a[k], query.b[k]
         first = count
+        contacts.scratch.features.state[1], contacts.scratch.features.state[2] = a, b
         posed_a = Posed(shapes.of_body[a], bodies.position[a], rotation[a])
         posed_b = Posed(shapes.of_body[b], bodies.position[b], rotation[b])
         count = pair_contacts(shapes, posed_a, posed_b, query.margin[k], contacts, count)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import sqrt
 from typing import NamedTuple
 
-from rigidimpulse.collision.bvh import STACK_ROWS
 from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, arc_miss, edge_normals, inner
 from rigidimpulse.collision.manifold.contact_points import (
     INSIDE,
@@ -15,7 +14,6 @@ from rigidimpulse.collision.manifold.contact_points import (
     TILT,
     Contact,
     append_contact,
-    outside_box,
 )
 from rigidimpulse.core.kernels import inlined
 from rigidimpulse.core.tolerances import TOLERANCES
@@ -28,7 +26,7 @@ SIDEWAYS = 0.5
 """Greatest offset across the normal, relative to the distance, of the ends of such a length."""
 
 
-class _Edges(NamedTuple):
+class Edges(NamedTuple):
     """Two edges in the frame of the first body: p + s d and q + t e, with s and t in [0, 1]."""
 
     a: int  # number of the first
@@ -40,7 +38,7 @@ class _Edges(NamedTuple):
 
 
 @inner
-def _arcs_miss(geometry, view, edges, normal):
+def arcs_miss(geometry, view, edges, normal):
     """Return (miss, end) of the edge whose arc a normal from a to b misses by more (see `arc_miss`).
 
     The normal, and the end, which points from a to b too, are in the frame of a.
@@ -98,7 +96,7 @@ def _crossing_contact(geometry, view, found, count, edges):
     for _ in range(2 if distance <= view.depth and view.leeway == 0.0 else 1):
         scale = sense / c_length
         normal = (c[0] * scale, c[1] * scale, c[2] * scale)
-        miss, end = _arcs_miss(geometry, view, edges, normal)
+        miss, end = arcs_miss(geometry, view, edges, normal)
         if miss <= tolerance + view.leeway and sense * distance <= view.skeleton:
             if 0.0 < miss <= tolerance:
                 normal = end
@@ -141,7 +139,7 @@ def _parallel_contacts(geometry, view, found, count, edges):
     if error > TILT and view.leeway == 0.0:
         return count, True
     tolerance = STRICT + view.leeway + error
-    if _arcs_miss(geometry, view, edges, normal)[0] > tolerance:
+    if arcs_miss(geometry, view, edges, normal)[0] > tolerance:
         return count, True
     for end in range(2):
         place = high if end == 1 else low
@@ -162,46 +160,28 @@ def _parallel_contacts(geometry, view, found, count, edges):
 
 
 @inner
-def edge_contacts(geometry, view, pairs, end, found, count):
-    """Append the contacts of the edges in both nodes of each pair; `view` is that of the second body's vertices.
+def edges_of(edge_a, edge_b, ends_a, ends_b):
+    """Two edges from their numbers and their ends (p, p + d) and (q, q + e)."""
+    (p, p_end), (q, q_end) = ends_a, ends_b
+    return Edges(edge_a, edge_b, p, subtract(p_end, p), q, subtract(q_end, q))
 
-    Returns the new count, and whether any two edges are in reach.
+
+@inner
+def edge_contacts(geometry, view, found, count, edge_a, edge_b):
+    """Append the contacts of an edge of the first body with one of the second, of whose vertices `view` is.
+
+    Returns the new count, and whether the edges are in reach.
     """
-    vertex, edge, touching_first, touching = geometry.vertex, geometry.edge, geometry.touching_first, geometry.touching
-    meshes, any_near = view.radius_v == 0.0 and view.radius_t == 0.0, False
-    for pair in range(STACK_ROWS, end):
-        a, b = pairs[pair, 0], pairs[pair, 1]
-        low, high = row(geometry.node_min, a), row(geometry.node_max, a)
-        start_a, start_b = geometry.node_start[a], geometry.node_start[b]
-        first_a, last_a = touching_first[start_a], touching_first[start_a + geometry.node_count[a]]
-        # Flat and concave edges touch no other edge; each edge is visited by its owner only.
-        for j in range(touching_first[start_b], touching_first[start_b + geometry.node_count[b]]):
-            if touching[j] % 2 == 0:
-                continue
-            edge_b = touching[j] // 2
-            q = moved(view.R, view.t, row(vertex, edge[edge_b, 0]))
-            q_end = moved(view.R, view.t, row(vertex, edge[edge_b, 1]))
-            if outside_box(q, q_end, low, high, view.reach):
-                continue
-            e = subtract(q_end, q)
-            for i in range(first_a, last_a):
-                if touching[i] % 2 == 0:
-                    continue
-                edge_a = touching[i] // 2
-                p, p_end = row(vertex, edge[edge_a, 0]), row(vertex, edge[edge_a, 1])
-                least = (min(p[0], p_end[0]), min(p[1], p_end[1]), min(p[2], p_end[2]))
-                most = (max(p[0], p_end[0]), max(p[1], p_end[1]), max(p[2], p_end[2]))
-                if outside_box(q, q_end, least, most, view.reach):
-                    continue
-                d = subtract(p_end, p)
-                c = cross(d, e)
-                sine_squared = dot(c, c) / (dot(d, d) * dot(e, e))
-                edges = _Edges(edge_a, edge_b, p, d, q, e)
-                if sine_squared > CROSSING * CROSSING:
-                    count, near = _crossing_contact(geometry, view, found, count, edges)
-                    any_near = any_near or near
-                # Nearly parallel edges of meshes have both ends of their overlap.
-                if meshes and sine_squared < NEARLY_PARALLEL * NEARLY_PARALLEL:
-                    count, near = _parallel_contacts(geometry, view, found, count, edges)
-                    any_near = any_near or near
+    vertex, edge = geometry.vertex, geometry.edge
+    q, q_end = moved(view.R, view.t, row(vertex, edge[edge_b, 0])), moved(view.R, view.t, row(vertex, edge[edge_b, 1]))
+    edges = edges_of(edge_a, edge_b, (row(vertex, edge[edge_a, 0]), row(vertex, edge[edge_a, 1])), (q, q_end))
+    d, e, any_near = edges.d, edges.e, False
+    c = cross(d, e)
+    sine_squared = dot(c, c) / (dot(d, d) * dot(e, e))
+    if sine_squared > CROSSING * CROSSING:
+        count, any_near = _crossing_contact(geometry, view, found, count, edges)
+    # Nearly parallel edges of meshes have both ends of their overlap.
+    if view.radius_v == 0.0 and view.radius_t == 0.0 and sine_squared < NEARLY_PARALLEL * NEARLY_PARALLEL:
+        count, near = _parallel_contacts(geometry, view, found, count, edges)
+        any_near = any_near or near
     return count, any_near

@@ -19,19 +19,20 @@ corners of faces that lie on each other and get the normal at the end of the arc
 ends of a line are wanted though one end is a little farther away.
 
 Both box trees are walked at once; pairs of leaves are gathered in chunks, so that no scene needs a larger buffer. Pairs of nodes whose
-normals cannot oppose each other are left out (see `normal_cones`), unless any normal is to pass.
+normals cannot oppose each other are left out (see `normal_cones`), unless any normal is to pass. Of the features in the leaves, pairs that
+may touch are listed first (`near_features`); a list may be kept for the next looks (`kept_features`). Contacts come from the pairs listed.
 """
 
 from __future__ import annotations
 
-from math import sqrt
+from math import cos, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.bvh import STACK_ROWS, gather_leaf_pairs
+from rigidimpulse.collision.bvh import STACK_ROWS, NodeLimits, gather_leaf_pairs
 from rigidimpulse.collision.distance.meshes import round_round_gap
-from rigidimpulse.collision.distance.simplices import CORNER, FACE_VERTEX, VERTEX_FACE, edge_normals, in_edge_arc, inner, over_triangle
-from rigidimpulse.collision.geometry import EDGE_HIDDEN
+from rigidimpulse.collision.distance.simplices import CORNER, FACE_VERTEX, VERTEX_FACE, edge_normals, in_edge_arc, inner
 from rigidimpulse.collision.manifold.contact_points import (
     ANY,
     DEPTH,
@@ -43,17 +44,53 @@ from rigidimpulse.collision.manifold.contact_points import (
     TILT,
     Contact,
     Found,
+    Pose,
     View,
     append_contact,
-    outside_box,
+)
+from rigidimpulse.collision.manifold.kept_features import (
+    BEGIN,
+    END,
+    IS_NEAR,
+    LEAST,
+    LEFT_OUT,
+    LEVER,
+    LOOKED,
+    MARGIN,
+    WAY,
+    clear_if_full,
+    end_list,
+    moved_by,
+    next_way,
+    note_list,
+    place_of,
 )
 from rigidimpulse.collision.manifold.mesh_edges import edge_contacts
+from rigidimpulse.collision.manifold.near_features import (
+    CREASE,
+    EDGES,
+    EVERY_NORMAL,
+    FLIPPED,
+    ON_FACE,
+    in_vertex_cone,
+    is_over_face,
+    near_features,
+)
 from rigidimpulse.core.kernels import inlined, jit_making_arrays
-from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import along, dot, moved, row, subtract, turned
 
-CREASE = 2.0 * TOLERANCES.surface.flat_angle
-"""How far outside a face beyond a hidden edge a point still counts as inside, relative to its height."""
+TURN = 1.05
+"""At least 2 asin(f / 2) / f for f up to 1."""
+
+
+class Meeting(NamedTuple):
+    """Two ROUND primitives at a pose."""
+
+    first: int
+    second: int
+    pose: Pose  # of the second in the frame of the first
+    back: Pose  # the reverse
+    margin: float  # m, greatest gap
 
 
 @inner
@@ -74,80 +111,26 @@ def _append_vertex(view, found, count, nearest, merge):
     return append_contact(found, count, Contact(point_v, point_t, normal, gap, kind, nearest.feature_a, nearest.feature_b), merge)
 
 
-@inner
-def _in_vertex_cone(geometry, corner, direction, slack, tolerance):
-    """Tell whether no edge that leaves a vertex runs along the direction, with a tolerance of a length `slack` [m] or an angle."""
-    vertex, edge = geometry.vertex, geometry.edge
-    vertex_edge_first, vertex_edge = geometry.vertex_edge_first, geometry.vertex_edge
-    origin = row(vertex, corner)
-    for i in range(vertex_edge_first[corner], vertex_edge_first[corner + 1]):
-        leaving = subtract(row(vertex, edge[vertex_edge[i], 0] + edge[vertex_edge[i], 1] - corner), origin)
-        length = sqrt(dot(leaving, leaving))
-        if dot(direction, leaving) > tolerance * length + min(slack, TILT * length):
-            return False
-    return True
-
-
 @inlined
-def _face_contact(geometry, view, found, count, vertex, p, triangle, height):
-    """Append the contact of a vertex at `p`, `height` over the plane of a face, if it lies over the face."""
-    a, b, c = (
-        row(geometry.vertex, geometry.triangle[triangle, 0]),
-        row(geometry.vertex, geometry.triangle[triangle, 1]),
-        row(geometry.vertex, geometry.triangle[triangle, 2]),
-    )
-    normal = row(geometry.triangle_normal, triangle)
-    hidden = (
-        geometry.edge_kind[geometry.triangle_edge[triangle, 0]] == EDGE_HIDDEN,
-        geometry.edge_kind[geometry.triangle_edge[triangle, 1]] == EDGE_HIDDEN,
-        geometry.edge_kind[geometry.triangle_edge[triangle, 2]] == EDGE_HIDDEN,
-    )
-    side = subtract(b, a)
-    size = sqrt(dot(side, side))
-    # Across a hidden edge the faces may meet at up to the flat angle: their prisms overlap, so that no gap is between.
-    crease = CREASE * abs(height)
-    slack_ab = INSIDE * size + (crease if hidden[0] else 0.0)
-    slack_bc = INSIDE * size + (crease if hidden[1] else 0.0)
-    slack_ca = INSIDE * size + (crease if hidden[2] else 0.0)
-    if (height < -view.depth and not view.two_sided) or not over_triangle(p, a, b, c, normal, slack_ab, slack_bc, slack_ca):
+def _face_contact(geometry, view, found, count, vertex, triangle):
+    """Append the contact of a vertex with a face, if it lies over it."""
+    p, normal = moved(view.R, view.t, row(geometry.vertex, vertex)), row(geometry.triangle_normal, triangle)
+    a, b = row(geometry.vertex, geometry.triangle[triangle, 0]), row(geometry.vertex, geometry.triangle[triangle, 1])
+    height = dot(subtract(p, a), normal)
+    if height > view.skeleton or height < -view.reach or (height < -view.depth and not view.two_sided):
         return count
-    foot = along(p, -height, normal)
+    if not is_over_face(geometry, p, triangle, height, 0.0):
+        return count
+    side, foot = subtract(b, a), along(p, -height, normal)
+    size, crease = sqrt(dot(side, side)), CREASE * abs(height)
     sense = 1.0 if height < 0.0 and view.two_sided else -1.0
     # Near an open surface the height does not tell on which side the body is, since it may be a little inside: its corner does.
     for _ in range(2 if view.two_sided and abs(height) <= view.depth else 1):
         outward = (sense * normal[0], sense * normal[1], sense * normal[2])
-        if _in_vertex_cone(geometry, vertex, turned(view.R_back, outward), view.skeleton, TILT):
+        if in_vertex_cone(geometry, vertex, turned(view.R_back, outward), view.skeleton, TILT):
             contact = Contact(p, foot, outward, -sense * height, FACE_VERTEX if view.flipped else VERTEX_FACE, vertex, triangle)
             return _append_vertex(view, found, count, contact, MERGE * size + 2.0 * crease)
         sense = -sense
-    return count
-
-
-@inner
-def _face_contacts(geometry, view, pairs, end, found, count):
-    """Append the contacts of the corners in one node of each pair with the faces in the other."""
-    vertex, triangle, touching_first, touching = geometry.vertex, geometry.triangle, geometry.touching_first, geometry.touching
-    for pair in range(STACK_ROWS, end):
-        node_v = pairs[pair, 1] if view.flipped else pairs[pair, 0]
-        node_t = pairs[pair, 0] if view.flipped else pairs[pair, 1]
-        low, high = row(geometry.node_min, node_t), row(geometry.node_max, node_t)
-        start_t, count_t = geometry.node_start[node_t], geometry.node_count[node_t]
-        start_v, count_v = geometry.node_start[node_v], geometry.node_count[node_v]
-        for i in range(touching_first[start_v], touching_first[start_v + count_v]):
-            if touching[i] % 2 == 1:
-                continue
-            corner = touching[i] // 2
-            p = moved(view.R, view.t, row(vertex, corner))
-            if outside_box(p, p, low, high, view.reach):
-                continue
-            for face in range(start_t, start_t + count_t):
-                a = row(vertex, triangle[face, 0])
-                normal = row(geometry.triangle_normal, face)
-                height = dot(subtract(p, a), normal)
-                # A triangle with two equal corners is a segment or a point and has no face.
-                if height > view.skeleton or height < -view.reach or triangle[face, 1] == triangle[face, 2]:
-                    continue
-                count = _face_contact(geometry, view, found, count, corner, p, face, height)
     return count
 
 
@@ -180,54 +163,49 @@ def _corner_contact(geometry, view, found, count, corner, p, touched):
         tilt = tolerance + min(TILT, view.slack / size)
         if not in_edge_arc(outward, direction, normal_0, normal_1, geometry.edge_kind[other], tilt):
             return count
-    elif not _in_vertex_cone(geometry, other, outward, view.slack, tolerance):
+    elif not in_vertex_cone(geometry, other, outward, view.slack, tolerance):
         return count
-    if not _in_vertex_cone(geometry, corner, turned(view.R_back, normal), view.slack, tolerance):
+    if not in_vertex_cone(geometry, corner, turned(view.R_back, normal), view.slack, tolerance):
         return count
     return _append_vertex(view, found, count, Contact(p, foot, normal, distance, CORNER, 2 * corner, feature), MERGE * size)
 
 
 @inner
-def _corner_contacts(geometry, view, pairs, end, found, count):
-    """Append the contacts of the corners in one node of each pair with the edges and corners in the other.
+def _feature_contact(geometry, view, found, count, corner, feature):
+    """Append the contact of a corner with an edge or a corner, if they are in reach; returns the new count, and whether they are."""
+    p, other = moved(view.R, view.t, row(geometry.vertex, corner)), feature // 2
+    if feature % 2 == 1:
+        a = row(geometry.vertex, geometry.edge[other, 0])
+        side = subtract(row(geometry.vertex, geometry.edge[other, 1]), a)
+        length_squared = dot(side, side)
+        s = dot(subtract(p, a), side) / length_squared
+        if s < -INSIDE or s > 1.0 + INSIDE:
+            return count, False
+        foot, size = along(a, s, side), sqrt(length_squared)
+    else:
+        foot = row(geometry.vertex, other)
+        size = abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(foot[0]) + abs(foot[1]) + abs(foot[2])
+    off = subtract(foot, p)
+    if dot(off, off) > view.skeleton * view.skeleton:
+        return count, False
+    return _corner_contact(geometry, view, found, count, corner, p, (foot, feature, size)), True
 
-    Returns the new count, and whether any two of these are in reach.
-    """
-    vertex, edge, touching_first, touching = geometry.vertex, geometry.edge, geometry.touching_first, geometry.touching
-    skeleton_squared, any_near = view.skeleton * view.skeleton, False
-    for pair in range(STACK_ROWS, end):
-        node_v = pairs[pair, 1] if view.flipped else pairs[pair, 0]
-        node_t = pairs[pair, 0] if view.flipped else pairs[pair, 1]
-        low, high = row(geometry.node_min, node_t), row(geometry.node_max, node_t)
-        start_t, start_v = geometry.node_start[node_t], geometry.node_start[node_v]
-        first_t, last_t = touching_first[start_t], touching_first[start_t + geometry.node_count[node_t]]
-        for i in range(touching_first[start_v], touching_first[start_v + geometry.node_count[node_v]]):
-            if touching[i] % 2 == 1:
-                continue
-            corner = touching[i] // 2
-            p = moved(view.R, view.t, row(vertex, corner))
-            if outside_box(p, p, low, high, view.skeleton):
-                continue
-            for j in range(first_t, last_t):
-                feature = touching[j]
-                if feature % 2 == 1:
-                    e = feature // 2
-                    a = row(vertex, edge[e, 0])
-                    side = subtract(row(vertex, edge[e, 1]), a)
-                    length_squared = dot(side, side)
-                    s = dot(subtract(p, a), side) / length_squared
-                    foot = along(a, s, side)
-                    off = subtract(foot, p)
-                    if -INSIDE <= s <= 1.0 + INSIDE and dot(off, off) <= skeleton_squared:
-                        size, any_near = sqrt(length_squared), True
-                        count = _corner_contact(geometry, view, found, count, corner, p, (foot, feature, size))
-                # Two corners are compared once, from the side of the first body.
-                elif not view.flipped:
-                    foot = row(vertex, feature // 2)
-                    off = subtract(foot, p)
-                    if dot(off, off) <= skeleton_squared:
-                        size, any_near = abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(foot[0]) + abs(foot[1]) + abs(foot[2]), True
-                        count = _corner_contact(geometry, view, found, count, corner, p, (foot, feature, size))
+
+@inner
+def _contacts_of_features(geometry, views, rows, span, found, count):
+    """Append the contacts of the pairs of features in rows `span` (begin, end); returns the new count, and whether any are in reach."""
+    of_a, of_b = views
+    any_near = False
+    for r in range(span[0], span[1]):
+        kind, one, other = rows[r, 0], np.int64(rows[r, 1]), np.int64(rows[r, 2])
+        view, near = of_b if kind > FLIPPED else of_a, False
+        if kind == EDGES:
+            count, near = edge_contacts(geometry, of_b, found, count, one, other)
+        elif kind == ON_FACE or kind == ON_FACE + FLIPPED:
+            count = _face_contact(geometry, view, found, count, one, other)
+        else:
+            count, near = _feature_contact(geometry, view, found, count, one, other)
+        any_near = any_near or near
     return count, any_near
 
 
@@ -260,17 +238,110 @@ def _keep_closest(found, end):
 
 
 @jit_making_arrays
-def _meet(geometry, first, second, pose, pairs):
+def _meet(geometry, meeting, pairs):
     """Whether the skeletons of two primitives cross or are nearer than what is left of normals by round-off."""
+    first, second = meeting.first, meeting.second
     nearest = MERGE * min(geometry.bound_radius[first], geometry.bound_radius[second])
-    pairs[0, 0] = geometry.node_first[first]
-    pairs[0, 1] = geometry.node_first[second]
-    _, end, _ = gather_leaf_pairs(geometry, pose.R, pose.t, nearest, nearest, True, pairs, np.int64(1))
+    pairs[0, 0], pairs[0, 1] = geometry.node_first[first], geometry.node_first[second]
+    limits = NodeLimits(nearest, nearest, nearest, 1.0, 0.0)
+    _, end, _ = gather_leaf_pairs(geometry, meeting.pose.R, meeting.pose.t, limits, True, pairs, np.int64(1))
     # Most pairs end here: no leaves meet.
     if end == STACK_ROWS:
         return False
     limit = nearest - geometry.radius[first] - geometry.radius[second]
-    return round_round_gap(geometry, first, second, pose, limit, pairs, np.empty(7)) < limit
+    return round_round_gap(geometry, first, second, meeting.pose, limit, pairs, np.empty(7)) < limit
+
+
+@jit_making_arrays
+def _are_in_reach(geometry, meeting, pairs):
+    """Whether the skeletons of two primitives are as near as contacts are looked for."""
+    first, second, exact = meeting.first, meeting.second, _views(geometry, meeting, 0.0, 0.0)[0]
+    limit = exact.reach * (1.0 + INSIDE) - exact.radius_v - exact.radius_t
+    return round_round_gap(geometry, first, second, meeting.pose, limit, pairs, np.empty(7)) < limit
+
+
+@jit_making_arrays
+def _views(geometry, meeting, way, leeway):
+    """The vertices of the first primitive seen from the second and the reverse; what is looked at reaches `way` m farther."""
+    first, second, (R, t), (R_back, t_back), margin = meeting
+    radius_a, radius_b = geometry.radius[first], geometry.radius[second]
+    size = min(geometry.bound_radius[first], geometry.bound_radius[second])
+    skeleton, depth = margin + radius_a + radius_b, min(DEPTH * margin, MOST_DEPTH * size)
+    reach = max(skeleton, depth) + way
+    skeleton, depth = skeleton + way, depth + way
+    edges_a = geometry.edge_first[first + 1] - geometry.edge_first[first]
+    edges_b = geometry.edge_first[second + 1] - geometry.edge_first[second]
+    slack = margin if edges_a > 0 and edges_b > 0 and radius_a + radius_b > 0.0 else 0.0
+    open_a, open_b = not geometry.closed[first], not geometry.closed[second]
+    return (
+        View(False, R_back, t_back, R, t, radius_a, radius_b, margin, depth, skeleton, reach, slack, leeway, open_b),
+        View(True, R, t, R_back, t_back, radius_b, radius_a, margin, depth, skeleton, reach, slack, leeway, open_a),
+    )
+
+
+@jit_making_arrays
+def _search(geometry, meeting, motion, leeway, scratch, found, count):
+    """Append the contacts of two primitives, and write the pairs of features that may touch at poses within `motion` (see `near_features`).
+
+    Returns the new count, whether any features are in reach, whether normals have left out boxes in reach, and where the rows end; -1 if
+    there were too few for all.
+    """
+    exact, wide, (way, turn) = _views(geometry, meeting, 0.0, leeway), _views(geometry, meeting, motion[0], leeway), motion
+    rows, pairs, reach, pose = scratch.features.rows, scratch.pairs, exact[0].reach, meeting.pose
+    angle = max(turn, 0.0)
+    clear_if_full(scratch.features)
+    limits = NodeLimits(reach, reach + way, exact[0].depth + INSIDE * reach + way, cos(angle), sin(angle))
+    pairs[0, 0], pairs[0, 1] = geometry.node_first[meeting.first], geometry.node_first[meeting.second]
+    begin = scratch.features.state[0]
+    used, all_there, any_near, any_left_out = begin, True, False, False
+    stacked = np.int64(1)  # (a literal would compile the walk twice)
+    while stacked > 0:
+        stacked, end, left_out = gather_leaf_pairs(geometry, pose.R, pose.t, limits, leeway == ANY, pairs, stacked)
+        any_left_out = any_left_out or left_out
+        at, most = np.int64(STACK_ROWS), end - STACK_ROWS
+        while at < end:
+            last = min(at + most, end)
+            after, near = near_features(geometry, wide, motion, pairs, (at, last), rows, used)
+            if after > rows.shape[0]:
+                # What was written is done with; if that is not enough, fewer leaves are looked at together.
+                most = most if used > begin else (most + 1) // 2
+                used, all_there = begin, False
+                continue
+            count, is_near = _contacts_of_features(geometry, exact, rows, (used, after), found, count)
+            any_near = any_near or (is_near if turn < 0.0 else near)
+            at, used = last, after if all_there else begin
+    return count, any_near, any_left_out, used if all_there else np.int64(-1)
+
+
+@jit_making_arrays
+def _of_list(geometry, meeting, contacts, found, count):
+    """Append the contacts of the features that are kept of two primitives, or are now found to be near.
+
+    Returns the new count, whether any may be in reach, and whether normals may have left out boxes in reach.
+    """
+    scratch, lists, (first, second) = contacts.scratch, contacts.scratch.features, (meeting.first, meeting.second)
+    size = min(geometry.bound_radius[first], geometry.bound_radius[second])
+    way, pose, smaller = LEAST * size, meeting.pose, second
+    if geometry.bound_radius[first] < geometry.bound_radius[second]:
+        pose, smaller = meeting.back, first
+    if lists.integer.shape[0] == 0:
+        count, near, left_out, _ = _search(geometry, meeting, (way, 2.0 * LEAST), 0.0, scratch, found, count)
+        return count, near, left_out
+    place, known = place_of(lists, first, second)
+    if known:
+        kept, bounds, looks = lists.integer[place], lists.real[place], lists.integer[place, LOOKED]
+        gone = moved_by(lists.real, place, pose.R, pose.t, row(geometry.bound_centre, smaller), bounds[LEVER])
+        if gone <= bounds[WAY] and meeting.margin <= bounds[MARGIN]:
+            kept[LOOKED] = looks + 1
+            views = _views(geometry, meeting, 0.0, 0.0)
+            count, _ = _contacts_of_features(geometry, views, lists.rows, (kept[BEGIN], kept[END]), found, count)
+            return count, kept[IS_NEAR] != 0, kept[LEFT_OUT] != 0
+        way = next_way(gone, looks, size)
+    lever = geometry.bound_radius[smaller] + meeting.margin + geometry.radius[first] + geometry.radius[second] + way
+    note_list(lists, place, (first, second), (way, meeting.margin, lever), pose.R, pose.t)
+    count, near, left_out, end = _search(geometry, meeting, (way, TURN * way / lever), 0.0, scratch, found, count)
+    end_list(lists, place, end, near, left_out)
+    return count, near, left_out
 
 
 @jit_making_arrays
@@ -279,36 +350,19 @@ def round_round_contacts(geometry, first, second, pose, margin, contacts, count)
 
     Where round-off lets no normal pass, the closest pair of features is the one contact.
     """
-    R, t, pairs = pose.R, pose.t, contacts.scratch
-    R_back, t_back = _pose_back(R, t)
-    radius_a, radius_b = geometry.radius[first], geometry.radius[second]
-    size = min(geometry.bound_radius[first], geometry.bound_radius[second])
-    skeleton, depth = margin + radius_a + radius_b, min(DEPTH * margin, MOST_DEPTH * size)
-    reach = max(skeleton, depth)
-    edges_a = geometry.edge_first[first + 1] - geometry.edge_first[first]
-    edges_b = geometry.edge_first[second + 1] - geometry.edge_first[second]
-    slack = margin if edges_a > 0 and edges_b > 0 and radius_a + radius_b > 0.0 else 0.0
-    open_a, open_b = not geometry.closed[first], not geometry.closed[second]
+    R_back, t_back = _pose_back(pose.R, pose.t)
+    meeting, scratch = Meeting(first, second, pose, Pose(R_back, t_back), margin), contacts.scratch
     found = Found(contacts.real, contacts.integer, count)
-    any_near, any_left_out = False, False
-    for leeway in (0.0, ANY):
-        of_a = View(False, R_back, t_back, R, t, radius_a, radius_b, margin, depth, skeleton, reach, slack, leeway, open_b)
-        of_b = View(True, R, t, R_back, t_back, radius_b, radius_a, margin, depth, skeleton, reach, slack, leeway, open_a)
-        pairs[0, 0] = geometry.node_first[first]
-        pairs[0, 1] = geometry.node_first[second]
-        stacked = np.int64(1)  # (a literal would compile the walk twice)
-        while stacked > 0:
-            stacked, end, left_out = gather_leaf_pairs(geometry, R, t, reach, depth + INSIDE * reach, leeway == ANY, pairs, stacked)
-            any_left_out = any_left_out or left_out
-            count, near = edge_contacts(geometry, of_b, pairs, end, found, count)
-            any_near = any_near or near
-            for view in (of_a, of_b):
-                count = _face_contacts(geometry, view, pairs, end, found, count)
-                count, near = _corner_contacts(geometry, view, pairs, end, found, count)
-                any_near = any_near or near
-        if leeway == ANY:
-            return _keep_closest(found, count)
-        # Without any two features in reach there is no contact that round-off could have cost its normal.
-        if count > found.first or not (any_near or (any_left_out and _meet(geometry, first, second, pose, pairs))):
-            return count
-    return count
+    count, near, left_out = _of_list(geometry, meeting, contacts, found, count)
+    if count > found.first:
+        return count
+    at_once = (LEAST * min(geometry.bound_radius[first], geometry.bound_radius[second]), EVERY_NORMAL)
+    # A list holds features, too, that come into reach later.
+    near = near and _are_in_reach(geometry, meeting, scratch.pairs)
+    if near:
+        count, near, left_out, _ = _search(geometry, meeting, at_once, 0.0, scratch, found, count)
+    # Without any two features in reach there is no contact that round-off could have cost its normal.
+    if count > found.first or not (near or (left_out and _meet(geometry, meeting, scratch.pairs))):
+        return count
+    count, _, _, _ = _search(geometry, meeting, at_once, ANY, scratch, found, count)
+    return _keep_closest(found, count)

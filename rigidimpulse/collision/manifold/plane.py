@@ -42,7 +42,7 @@ def round_half_space_contacts(geometry, round_, half_space, pose, margin, contac
     node_start, node_count = geometry.node_start, geometry.node_count
     triangle, owns, corner = geometry.triangle, geometry.triangle_owns, geometry.vertex_corner
     normal, offset = plane_in_frame(geometry.frame, half_space, pose.R, pose.t)
-    stack = contacts.scratch
+    stack = contacts.scratch.pairs
     inward = (-normal[0], -normal[1], -normal[2])
     radius = geometry.radius[round_]
     stack[0, 0] = geometry.node_first[round_]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigidimpulse.collision.manifold.dispatch import SCRATCH_ROWS
+from rigidimpulse.collision.manifold.kept_features import FEW_ROWS, make_contact_scratch
 from rigidimpulse.collision.time_of_impact.bisection import LOOK_AHEAD
 from rigidimpulse.core.kernel_cache import is_kept, note_beside
 from rigidimpulse.core.memory import rows_of
@@ -122,7 +123,7 @@ class CompiledLoop:
         self._elsewhere = np.zeros(n, bool)
         self._cycles, self._calls = np.zeros(VERBS, np.int64), np.zeros(VERBS, np.int64)
         self._lines = {verb: [line for line in run.plan.lines if line.included and line.name in names] for verb, names in EFFECTS.items()}
-        self._scratch = np.empty((SCRATCH_ROWS, 2), np.int64)
+        self._scratch = make_contact_scratch.py_func(SCRATCH_ROWS, 0, FEW_ROWS)
         self._reports = _make_reports(FIRST_REPORTS)
         state = run.state
         pairs = np.empty((most_pairs(n), 2), np.int32)

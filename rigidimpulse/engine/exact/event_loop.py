@@ -17,6 +17,7 @@ import numpy as np
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.contact_points import Contacts as ContactBuffers
 from rigidimpulse.collision.manifold.dispatch import SCRATCH_ROWS
+from rigidimpulse.collision.manifold.kept_features import FEW_ROWS, make_contact_scratch
 from rigidimpulse.collision.time_of_impact.result import STALLED, ImpactTimes, SearchEffort
 from rigidimpulse.collision.time_of_impact.safe_step import SweepScratch
 from rigidimpulse.collision.time_of_impact.search import first_contacts
@@ -761,13 +762,13 @@ def _contacts_near(loop, members, time):
 def _contacts_of(loop, places, margin, time):
     """The contacts of the pairs at these places within `margin` contact margins, at the present poses, sorted by pair."""
     table, motion, shapes, count = loop.table, loop.motion, loop.shapes, NONE
-    found = make_found(FIRST_CONTACTS, np.int64(0), np.empty((SCRATCH_ROWS, 2), np.int64))
+    found = make_found(FIRST_CONTACTS, np.int64(0), make_contact_scratch(SCRATCH_ROWS, np.int64(0), FEW_ROWS))
     while count < 0:
         count = contacts_at(shapes, motion, table, places, margin, found, np.int64(0))
         if count >= 0:
             count = witness_contacts(table, places, time, found, np.int64(0), count)
         if count < 0:
-            found = make_found(-2 * count, np.int64(0), np.empty((-8 * count, 2), np.int64))
+            found = make_found(-2 * count, np.int64(0), make_contact_scratch(-8 * count, np.int64(0), FEW_ROWS))
     order, owner = np.empty(count, np.int64), np.zeros(count, np.int64)
     for c in range(count):
         order[c] = c

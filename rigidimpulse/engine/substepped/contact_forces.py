@@ -28,7 +28,7 @@ from rigidimpulse.collision.contact_cache import (
 )
 from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT
 from rigidimpulse.collision.contact_table import ContactTable
-from rigidimpulse.collision.contact_update import Searched, SmallerShapes, ask_general, make_asked, store_contacts
+from rigidimpulse.collision.contact_update import Searched, SmallerShapes, ask_general, make_asked, mark_apart, store_contacts
 from rigidimpulse.collision.fat_boxes import BodyBounds, FatBoxes
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.contact_points import TILT
@@ -216,7 +216,7 @@ class ContactStepper:
         self.balance = make_balance(n)
         self._shares, self._looked_at = self._sharing.most_cores, 0
         self._workspaces = [make_workspace() for _ in range(self._shares)]
-        self._more_buffers: list[ContactBuffer] = []
+        self._buffers: list[ContactBuffer] = []
         self.table = ContactTable(self._shares, n, self._sharing.first_points, self._sharing.points_of_a_body)
         least = CLEAR * np.where(movable, self.inner, 0.0)
         moves = world.dynamic | world.moving
@@ -385,19 +385,24 @@ class ContactStepper:
         asked, smaller = self._asked, self._smaller
         ask_general(smaller, self._taken_off, self.bodies, table.pairs, places, margin, self.order, asked)
         now = run.state.now._replace(position=asked.position, orientation=asked.orientation)
-        shares = self._shares if count > self._sharing.general_pairs else 1
-        edges = [count * share // shares for share in range(shares + 1)]
-        parts = [slice(begin, end) for begin, end in pairwise(edges)]
-        while len(self._more_buffers) < shares - 1:
-            self._more_buffers.append(ContactBuffer(self._sharing.buffer))
-        buffers = [run.contact_buffer, *self._more_buffers][:shares]
+        shares, is_apart = self._shares if count > self._sharing.general_pairs else 1, np.zeros(count, bool)
+        if self._depth.any():
+            edges = pairwise(count * share // shares for share in range(shares + 1))
+            self._sharing.call(mark_apart, [
+                (smaller, world.shape_of_body, self.bodies, asked, table.pairs, places, edge, is_apart) for edge in edges
+            ])  # fmt: skip
+        while len(self._buffers) < self._shares:
+            self._buffers.append(ContactBuffer(self._sharing.buffer, keeps=True))
+        # A pair goes to the same buffer each time: what is near is kept there.
+        share = (asked.a[:count] + asked.b[:count]) % self._shares
+        parts = [np.flatnonzero((share == k) & ~is_apart) for k in range(self._shares)]
         shapes = Shapes(self.geometry, world.shape_of_body)
         questions = [
             Question(shapes, now, asked.rotation, PairQuery(asked.a[part], asked.b[part], asked.shown[part])) for part in parts
         ]  # fmt: skip
-        for part, buffer, found in zip(parts, buffers, find_together(buffers, questions), strict=True):
+        for part, buffer, found in zip(parts, self._buffers, find_together(self._buffers, questions, shares > 1), strict=True):
             # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
-            table.grow(found + POINTS * (part.stop - part.start) + 1)
+            table.grow(found + POINTS * len(part) + 1)
             store_contacts(
                 smaller, self.bodies, table.arrays, Searched(places[part], margin[part], asked.far[part]), (buffer.real, buffer.integer),
                 found, self.order, world.coefficients,
