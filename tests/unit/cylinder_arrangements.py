@@ -16,6 +16,7 @@ from rigidimpulse.collision.manifold.cylinder import (
     cylinder_round_contacts,
     cylinder_round_gap,
 )
+from rigidimpulse.collision.manifold.kept_features import FEW_ROWS, make_contact_scratch
 from rigidimpulse.core.kernels import jit
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -71,14 +72,14 @@ class Contacts:
         self.geometry = build_geometry([CompiledShape((first,)), CompiledShape((second,))])
         self.R = np.ascontiguousarray(np.eye(3) if rotation is None else rotation.as_matrix())
         self.pose = Pose(self.R, np.array(position, dtype=float))
-        self.stack, real, integer = np.zeros((200, 2), np.int64), np.zeros((200, 10)), np.zeros((200, 5), np.int64)
-        count = contacts_kernel(self.geometry, 0, 1, self.pose, margin, Buffers(real, integer, self.stack))
+        self.scratch, real, integer = make_contact_scratch.py_func(200, 0, FEW_ROWS), np.zeros((200, 10)), np.zeros((200, 5), np.int64)
+        count = contacts_kernel(self.geometry, 0, 1, self.pose, margin, Buffers(real, integer, self.scratch))
         self.point_a, self.point_b, self.normal = real[:count, :3], real[:count, 3:6], real[:count, 6:9]
         self.gap, self.features = real[:count, 9], integer[:count, 3:5]
 
     def least_gap(self, limit=1e9):
         out = np.zeros(9)
-        return gap_kernel(self.geometry, 0, 1, self.pose, limit, self.stack, out), out[:3], out[3:6]
+        return gap_kernel(self.geometry, 0, 1, self.pose, limit, self.scratch.pairs, out), out[:3], out[3:6]
 
     def expect(self, points, normals, gap=None, tolerance=1e-12):
         """Check that the points on the first body are these, in any order, and the normals too."""

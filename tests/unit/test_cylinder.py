@@ -30,6 +30,7 @@ from scipy.spatial.transform import Rotation
 from rigidimpulse.collision.geometry import CYLINDER, ROUND, CompiledShape, Primitive, build_geometry
 from rigidimpulse.collision.manifold.contact_points import Contacts as Buffers
 from rigidimpulse.collision.manifold.contact_points import Pose
+from rigidimpulse.collision.manifold.kept_features import FEW_ROWS, make_contact_scratch
 
 EIGHTHS = 2.0 * np.pi * np.arange(8) / 8
 GAP = 1e-5
@@ -350,8 +351,8 @@ def test_contacts_scale_with_the_scene(scale):
 def test_full_buffer_counts_on_and_limit_is_kept():
     geometry = build_geometry([CompiledShape((cylinder(),)), CompiledShape((half_space(offset=-1.0 - GAP),))])
     real, integer = np.zeros((3, 10)), np.zeros((3, 5), np.int64)
-    stack, out = np.zeros((200, 2), np.int64), np.full(9, 7.0)
+    scratch, out = make_contact_scratch.py_func(200, 0, FEW_ROWS), np.full(9, 7.0)
     pose = Pose(np.eye(3), np.zeros(3))
-    assert contacts_kernel(geometry, 0, 1, pose, 1e-4, Buffers(real, integer, stack)) == 8
-    assert gap_kernel(geometry, 0, 1, pose, 1e-6, stack, out) == 1e-6
+    assert contacts_kernel(geometry, 0, 1, pose, 1e-4, Buffers(real, integer, scratch)) == 8
+    assert gap_kernel(geometry, 0, 1, pose, 1e-6, scratch.pairs, out) == 1e-6
     assert np.all(out == 7.0)
