@@ -65,7 +65,6 @@ class ContactBuffer:
         """Grow to at least `needed` contacts, and to twice the present capacity."""
         capacity = max(needed, 2 * len(self.real))
         self.real, self.integer = np.empty((capacity, 10)), np.empty((capacity, 5), np.int64)
-        self.scratch = self.scratch._replace(pairs=np.empty((max(4 * capacity, len(self.scratch.pairs)), 2), np.int64))
 
     @property
     def contacts(self) -> Contacts:

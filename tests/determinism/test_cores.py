@@ -14,7 +14,6 @@ import pytest
 import trimesh
 
 import rigidimpulse as ri
-from rigidimpulse.collision.contact_buffer import ContactBuffer
 from rigidimpulse.collision.contact_cache import BLOCK, find_contacts, share_of
 from rigidimpulse.core.kernels import MOST_CORES, Kernel, number_of_cores
 from rigidimpulse.dynamics.solvers.tgs_soft.solver import BATCHES_EACH, advance
@@ -44,12 +43,10 @@ def rings() -> list[ri.Shape]:
     return [ri.Shape.mesh(ring.vertices, ring.faces), ri.Shape.box((0.2, 0.15, 0.1))]
 
 
-def shared(scene: ri.Scene, duration: float, sharing: Sharing, contacts: int | None = None) -> str:
-    """The hash of a run whose islands share their work so; contacts: that the buffer of the run holds at first."""
+def shared(scene: ri.Scene, duration: float, sharing: Sharing) -> str:
+    """The hash of a run whose islands share their work so."""
     run = prepare(scene, frame_times(duration, 60.0))
     run.substepped = SubsteppedIslands(run.world, sharing)
-    if contacts is not None:
-        run.contact_buffer = ContactBuffer(contacts)
     return complete(run, duration).state_hash()
 
 
@@ -114,7 +111,7 @@ def test_sub_steps_have_the_same_bits_however_much_the_helper_does(alone: str, h
 def test_contacts_that_find_no_space_are_found_again() -> None:
     """Whatever a buffer holds at first, in whichever share."""
     usual = shared(cloud(rings(), 72), 0.3, Sharing(most_cores=2, general_pairs=4))
-    assert shared(cloud(rings(), 72), 0.3, Sharing(most_cores=2, general_pairs=4, buffer=40), contacts=40) == usual
+    assert shared(cloud(rings(), 72), 0.3, Sharing(most_cores=2, general_pairs=4, buffer=40)) == usual
 
 
 @pytest.mark.parametrize("shares", [1, 2, 3])

@@ -38,8 +38,8 @@ FEWEST_LOOKS = 1.5
 """Looks for which it is worth to find more pairs."""
 TRIES = 4
 """Neighbouring places of the table at which a pair of bodies may be."""
-FREE_PART = 8
-"""Part of the rows that must be free for a new list; else all lists are given up."""
+SEARCHES = 8
+"""Parts into which the rows are divided: a search may use one, which is at least 168 rows, what two leaves may need."""
 A, B, FIRST, SECOND, BEGIN, END, LOOKED, IS_NEAR, LEFT_OUT, INTEGERS = range(10)
 """Columns of `FeatureScratch.integer`: bodies, primitives, rows of the list, looks since it was found, and what `end_list` keeps. Column
 LOOKED is 0 at a free place."""
@@ -127,25 +127,27 @@ def note_list(lists, place, primitives, bounds, R, t):
 
 
 @inner
-def end_list(lists, place, end, is_near, left_out):
-    """Keep a new list, whose rows end at `end`; -1: there were too few, and it is not kept.
+def end_list(lists, place, rows, is_near, left_out):
+    """Keep a new list with `rows` rows; -1: there were too few, and it is not kept.
 
     is_near, left_out: whether features were in reach, and boxes left out by their normals.
     """
     integer = lists.integer
-    integer[place, LOOKED] = 1 if end >= 0 else 0
-    if end < 0:
+    integer[place, LOOKED] = 1 if rows >= 0 else 0
+    if rows < 0:
         return
-    integer[place, BEGIN], integer[place, END] = lists.state[0], end
+    integer[place, BEGIN], integer[place, END] = lists.state[0], lists.state[0] + rows
     integer[place, IS_NEAR], integer[place, LEFT_OUT] = is_near, left_out
-    lists.state[0] = end
+    lists.state[0] += rows
 
 
 @inner
-def clear_if_full(lists):
-    """Give up all lists if few rows are left."""
-    rows = lists.rows.shape[0]
-    if (rows - lists.state[0]) * FREE_PART < rows:
+def rows_of_search(lists):
+    """Return (begin, end) of the rows that one search may use: as many whatever is kept. If they are not free, all lists are given up."""
+    rows, places = lists.rows.shape[0], lists.integer.shape[0]
+    number = rows // SEARCHES if places > 0 else rows
+    if lists.state[0] + number > rows:
         lists.state[0] = 0
-        for place in range(lists.integer.shape[0]):
+        for place in range(places):
             lists.integer[place, LOOKED] = 0
+    return lists.state[0], lists.state[0] + number

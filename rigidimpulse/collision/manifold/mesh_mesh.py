@@ -58,12 +58,12 @@ from rigidimpulse.collision.manifold.kept_features import (
     LOOKED,
     MARGIN,
     WAY,
-    clear_if_full,
     end_list,
     moved_by,
     next_way,
     note_list,
     place_of,
+    rows_of_search,
 )
 from rigidimpulse.collision.manifold.mesh_edges import edge_contacts
 from rigidimpulse.collision.manifold.near_features import (
@@ -283,34 +283,33 @@ def _views(geometry, meeting, way, leeway):
 def _search(geometry, meeting, motion, leeway, scratch, found, count):
     """Append the contacts of two primitives, and write the pairs of features that may touch at poses within `motion` (see `near_features`).
 
-    Returns the new count, whether any features are in reach, whether normals have left out boxes in reach, and where the rows end; -1 if
-    there were too few for all.
+    Returns the new count, whether any features are in reach, whether normals have left out boxes in reach, and how many rows were written;
+    -1 if leaves or rows were too many to be looked at together.
     """
     exact, wide, (way, turn) = _views(geometry, meeting, 0.0, leeway), _views(geometry, meeting, motion[0], leeway), motion
-    rows, pairs, reach, pose = scratch.features.rows, scratch.pairs, exact[0].reach, meeting.pose
+    begin, last_row = rows_of_search(scratch.features)
+    rows, pairs, reach, pose = scratch.features.rows[begin:last_row], scratch.pairs, exact[0].reach, meeting.pose
     angle = max(turn, 0.0)
-    clear_if_full(scratch.features)
     limits = NodeLimits(reach, reach + way, exact[0].depth + INSIDE * reach + way, cos(angle), sin(angle))
     pairs[0, 0], pairs[0, 1] = geometry.node_first[meeting.first], geometry.node_first[meeting.second]
-    begin = scratch.features.state[0]
-    used, all_there, any_near, any_left_out = begin, True, False, False
+    used, together, any_near, any_left_out = np.int64(0), True, False, False
     stacked = np.int64(1)  # (a literal would compile the walk twice)
     while stacked > 0:
         stacked, end, left_out = gather_leaf_pairs(geometry, pose.R, pose.t, limits, leeway == ANY, pairs, stacked)
-        any_left_out = any_left_out or left_out
+        any_left_out, together = any_left_out or left_out, together and stacked == 0
         at, most = np.int64(STACK_ROWS), end - STACK_ROWS
         while at < end:
             last = min(at + most, end)
             after, near = near_features(geometry, wide, motion, pairs, (at, last), rows, used)
             if after > rows.shape[0]:
                 # What was written is done with; if that is not enough, fewer leaves are looked at together.
-                most = most if used > begin else (most + 1) // 2
-                used, all_there = begin, False
+                most = most if used > 0 else (most + 1) // 2
+                used, together = np.int64(0), False
                 continue
             count, is_near = _contacts_of_features(geometry, exact, rows, (used, after), found, count)
             any_near = any_near or (is_near if turn < 0.0 else near)
-            at, used = last, after if all_there else begin
-    return count, any_near, any_left_out, used if all_there else np.int64(-1)
+            at, used = last, after if together else np.int64(0)
+    return count, any_near, any_left_out, used if together else np.int64(-1)
 
 
 @jit_making_arrays
@@ -320,28 +319,31 @@ def _of_list(geometry, meeting, contacts, found, count):
     Returns the new count, whether any may be in reach, and whether normals may have left out boxes in reach.
     """
     scratch, lists, (first, second) = contacts.scratch, contacts.scratch.features, (meeting.first, meeting.second)
-    size = min(geometry.bound_radius[first], geometry.bound_radius[second])
-    way, pose, smaller = LEAST * size, meeting.pose, second
+    views, size = _views(geometry, meeting, 0.0, 0.0), min(geometry.bound_radius[first], geometry.bound_radius[second])
+    least, pose, smaller = (LEAST * size, 2.0 * LEAST), meeting.pose, second
     if geometry.bound_radius[first] < geometry.bound_radius[second]:
         pose, smaller = meeting.back, first
     if lists.integer.shape[0] == 0:
-        count, near, left_out, _ = _search(geometry, meeting, (way, 2.0 * LEAST), 0.0, scratch, found, count)
+        count, near, left_out, _ = _search(geometry, meeting, least, 0.0, scratch, found, count)
         return count, near, left_out
+    way = least[0]
     place, known = place_of(lists, first, second)
     if known:
         kept, bounds, looks = lists.integer[place], lists.real[place], lists.integer[place, LOOKED]
         gone = moved_by(lists.real, place, pose.R, pose.t, row(geometry.bound_centre, smaller), bounds[LEVER])
         if gone <= bounds[WAY] and meeting.margin <= bounds[MARGIN]:
             kept[LOOKED] = looks + 1
-            views = _views(geometry, meeting, 0.0, 0.0)
             count, _ = _contacts_of_features(geometry, views, lists.rows, (kept[BEGIN], kept[END]), found, count)
             return count, kept[IS_NEAR] != 0, kept[LEFT_OUT] != 0
         way = next_way(gone, looks, size)
-    lever = geometry.bound_radius[smaller] + meeting.margin + geometry.radius[first] + geometry.radius[second] + way
+    lever = geometry.bound_radius[smaller] + views[0].reach + way
     note_list(lists, place, (first, second), (way, meeting.margin, lever), pose.R, pose.t)
-    count, near, left_out, end = _search(geometry, meeting, (way, TURN * way / lever), 0.0, scratch, found, count)
-    end_list(lists, place, end, near, left_out)
-    return count, near, left_out
+    after, near, left_out, rows = _search(geometry, meeting, (way, TURN * way / lever), 0.0, scratch, found, count)
+    end_list(lists, place, rows, near, left_out)
+    if rows < 0 and way > least[0]:
+        # The order of contacts tells what was looked at together: it must not depend on s, which what happened before decides.
+        after, near, left_out, _ = _search(geometry, meeting, least, 0.0, scratch, found, count)
+    return after, near, left_out
 
 
 @jit_making_arrays
