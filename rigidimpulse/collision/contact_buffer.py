@@ -8,12 +8,10 @@ import numpy as np
 
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.contact_points import Contacts
-from rigidimpulse.collision.manifold.dispatch import PairQuery, contacts_of_pairs
+from rigidimpulse.collision.manifold.dispatch import ALL, PairQuery, contacts_of_pairs
 from rigidimpulse.collision.manifold.kept_features import FEW_ROWS, MANY_PAIRS, MANY_ROWS, PLACES, make_contact_scratch
 
 CONTACT_CAPACITY, PAIR_CAPACITY = 1024, 4096
-ALL = np.int64(0)
-"""All contacts are kept: which of them carry is known when their points are on the true bodies (`contact_update`)."""
 
 
 class PosedBodies(Protocol):
@@ -72,11 +70,9 @@ class ContactBuffer:
         return Contacts(self.real, self.integer, self.scratch)
 
 
-def find_together(buffers: list[ContactBuffer], questions: list[Question], at_once: bool) -> list[int]:
-    """Numbers of contacts found for each question, each in its own buffer; at_once: on several cores."""
+def find_together(buffers: list[ContactBuffer], questions: list[Question]) -> list[int]:
+    """Numbers of contacts found for each question, each in its own buffer, on several cores."""
     asked = list(zip(buffers, questions, strict=True))
-    if not at_once:
-        return [buffer.find(question) for buffer, question in asked]
     counts = contacts_of_pairs.together([(*question, buffer.contacts, ALL) for buffer, question in asked])
     for k, (buffer, question) in enumerate(asked):
         if counts[k] < 0:

@@ -69,8 +69,8 @@ class Convex(NamedTuple):
 class Share(NamedTuple):
     """A part of the pairs, and where the pairs are listed whose contacts must be found."""
 
-    number: int  # which of the shares
-    shares: int
+    number: int | np.int64  # which of the shares
+    shares: int | np.int64
     places: np.ndarray  # (k,) pairs
     margins: np.ndarray  # (k,) m
 

@@ -63,12 +63,14 @@ class Asked(NamedTuple):
     position: np.ndarray  # (n, 3) m
     orientation: np.ndarray  # (n, 4)
     rotation: np.ndarray  # (n, 3, 3)
+    is_apart: np.ndarray  # (k,) bool, there is no contact, see `mark_apart`
 
 
 def make_asked(pairs: int, number: int) -> Asked:
     """Space for questions about `pairs` pairs of `number` bodies."""
     a, b, shown, far = np.zeros(pairs, np.int64), np.zeros(pairs, np.int64), np.zeros(pairs), np.zeros(pairs)
-    return Asked(a, b, shown, far, np.zeros((number, 3)), np.zeros((number, 4)), np.zeros((number, 3, 3)))
+    poses = np.zeros((number, 3)), np.zeros((number, 4)), np.zeros((number, 3, 3))
+    return Asked(a, b, shown, far, *poses, np.zeros(pairs, bool))
 
 
 @jit
@@ -96,13 +98,13 @@ def ask_general(smaller, taken_off, bodies, pairs, places, margins, order, asked
 
 
 @jit_making_arrays
-def mark_apart(smaller, shape_of_body, bodies, asked, pairs, places, span, is_apart):
+def mark_apart(smaller, shape_of_body, bodies, asked, pairs, places, span):
     """Mark the pairs of meshes at `places` that have had no contacts and are too far apart for any, and note how far: they need no search.
 
     A search for contacts is expensive for meshes, their gap is less so, and tells for how long there are none. asked: `Asked`, of these
-    pairs; span: (begin, end) of those that are looked at; is_apart (k,) bool: the result.
+    pairs; span: (begin, end) of those that are looked at.
     """
-    out = np.empty(7)
+    out, is_apart = np.empty(7), asked.is_apart
     for k in range(span[0], span[1]):
         p = places[k]
         is_apart[k] = False

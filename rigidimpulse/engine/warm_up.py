@@ -29,32 +29,40 @@ import numpy as np
 from rigidimpulse.collision.manifold.shrunk_shapes import convex_polyhedra, several_polyhedra
 from rigidimpulse.core.claim import claim
 from rigidimpulse.core.kernel_cache import is_kept, note_beside, source_digest, variables_to_share_kernels
-from rigidimpulse.core.kernels import Kernel
+from rigidimpulse.core.kernels import Kernel, number_of_cores
 from rigidimpulse.model.world import World
 
 logger = logging.getLogger("rigidimpulse")
 LOOP = "order of events"
 CONTACTS, EVENTS, SUBSTEPPED, JOINTS = "contacts", "impacts of balls", "sub-stepped islands", "joints"
+POLYHEDRA, SHARED = "convex polyhedra in sub-stepped islands", "sub-stepped islands on several cores"
 STEPPED_JOINTS, ANY_SHAPES = "joints in sub-stepped islands", "any shapes in sub-stepped islands"
 UNDER_FORCES = "contacts under varying forces"
 LAST = {
     CONTACTS: ("engine.touching", "find_touching"),
     EVENTS: ("engine.spheres.flight", "fly"),
-    SUBSTEPPED: ("dynamics.solvers.tgs_soft.solver", "advance"),
+    SUBSTEPPED: ("engine.sleeping", "advance_sleep_timers"),
+    POLYHEDRA: ("engine.substepped.stages", "go_on_with_polyhedra"),
     JOINTS: ("dynamics.constraints.joint_sub_step", "close_at_end"),
     STEPPED_JOINTS: ("dynamics.solvers.time_stepping.solver", "step_island"),
-    ANY_SHAPES: ("collision.contact_update", "store_contacts"),
+    ANY_SHAPES: ("engine.substepped.stages", "go_on"),
+    SHARED: ("engine.substepped.stages", "work_on"),
     UNDER_FORCES: ("dynamics.constraints.contact", "hold_contacts"),
 }
 """The kernel of each kind that is compiled last."""
 _BACKGROUND: list[subprocess.Popen] = []
 """Processes that nobody waits for."""
 PARTS_MODULE = "rigidimpulse.engine.warm_up_parts"
-SECONDS = {CONTACTS: 60, EVENTS: 20, SUBSTEPPED: 35, JOINTS: 40, STEPPED_JOINTS: 40, ANY_SHAPES: 30, UNDER_FORCES: 15, LOOP: 70}
+SECONDS = {
+    CONTACTS: 60, EVENTS: 20, SUBSTEPPED: 15, POLYHEDRA: 30, SHARED: 25, JOINTS: 40, STEPPED_JOINTS: 40, ANY_SHAPES: 50,
+    UNDER_FORCES: 15, LOOP: 70,
+}  # fmt: skip
 """s that compiling each kind takes, about, on two threads of one core."""
 LONGEST_WAIT, LOOK_AGAIN = 10.0, 0.2
 """How many times as long as compiling takes a process waits for another one that compiles; s, how often it looks whether that has ended."""
-NUMBER_OF_PARTS = {CONTACTS: 3, EVENTS: 1, SUBSTEPPED: 2, JOINTS: 4, STEPPED_JOINTS: 1, ANY_SHAPES: 1, UNDER_FORCES: 1, LOOP: 1}
+MANY_BODIES = 100
+"""Bodies of which several cores may share the work."""
+NUMBER_OF_PARTS = dict.fromkeys(SECONDS, 1) | {CONTACTS: 3, JOINTS: 4}
 
 
 @dataclass(frozen=True)
@@ -124,17 +132,20 @@ def kernels_to_compile(
 
     is_ready: whether a kernel need not be compiled.
     """
-    joints = bool(world.joints_of_scene)
+    joints, other_shapes = bool(world.joints_of_scene), with_substepped and has_other_shapes(world)
     needed = {
         CONTACTS: world.can_collide, EVENTS: with_events, SUBSTEPPED: with_substepped, JOINTS: joints,
-        STEPPED_JOINTS: with_substepped and joints, ANY_SHAPES: with_substepped and world.can_collide and _has_other_shapes(world),
-        UNDER_FORCES: world.can_collide and bool(world.force_tables),
+        POLYHEDRA: with_substepped and not other_shapes and (world.can_collide or joints), ANY_SHAPES: with_substepped and other_shapes,
+        SHARED: with_substepped and world.num_bodies > MANY_BODIES and number_of_cores() > 1,
+        STEPPED_JOINTS: with_substepped and joints, UNDER_FORCES: world.can_collide and bool(world.force_tables),
     }  # fmt: skip
     return [kind for kind in LAST if needed[kind] and not is_ready(_last_kernel(kind))]
 
 
-def _has_other_shapes(world: World) -> bool:
-    """Whether a body is no half space nor made of convex polyhedra, for whose pairs sub-stepped islands have kernels of their own."""
+def has_other_shapes(world: World) -> bool:
+    """Whether a body that may collide is no half space nor made of convex polyhedra, for whose pairs sub-stepped islands have kernels."""
+    if not world.can_collide:
+        return False
     geometry = world.geometry
     polyhedra = convex_polyhedra(geometry, world.convex_depths) | several_polyhedra(geometry)
     return bool(np.any(~world.half_space & ~polyhedra[world.shape_of_body]))

@@ -21,6 +21,8 @@ from rigidimpulse.engine.warm_up import (
     EVENTS,
     JOINTS,
     LOOP,
+    POLYHEDRA,
+    SHARED,
     STEPPED_JOINTS,
     SUBSTEPPED,
     UNDER_FORCES,
@@ -31,7 +33,7 @@ from rigidimpulse.engine.warm_up import (
 
 LOOK = 0.1
 """s between two looks at the processes."""
-ALL_PARTS = tuple(parts_of((CONTACTS, LOOP, ANY_SHAPES, STEPPED_JOINTS, SUBSTEPPED, JOINTS, EVENTS, UNDER_FORCES)))
+ALL_PARTS = tuple(parts_of((CONTACTS, LOOP, ANY_SHAPES, STEPPED_JOINTS, POLYHEDRA, SHARED, SUBSTEPPED, JOINTS, EVENTS, UNDER_FORCES)))
 """All there are; those that take long come first, so that at the end no process works alone for long."""
 
 

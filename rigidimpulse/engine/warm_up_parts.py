@@ -30,7 +30,6 @@ from rigidimpulse.dynamics.constraints.position_correction import Sunk, correct_
 from rigidimpulse.dynamics.constraints.rolling_friction import NO_ROLLING, rolling_of
 from rigidimpulse.dynamics.constraints.rows import change_velocities, changes_of, contact_rows, make_rows, response_to, row_velocities
 from rigidimpulse.dynamics.solvers.newton import solve_newton
-from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick
 from rigidimpulse.engine.begin import make_plan, make_run
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.exact.compiled_loop import CompiledLoop
@@ -49,6 +48,7 @@ from rigidimpulse.engine.spheres.run import EventRun
 from rigidimpulse.engine.step import step
 from rigidimpulse.engine.substepped.contact_forces import COARSE, ContactStepper
 from rigidimpulse.engine.substepped.jointed import JointedStepper
+from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.warm_up import (
     ANY_SHAPES,
@@ -58,6 +58,8 @@ from rigidimpulse.engine.warm_up import (
     LONGEST_WAIT,
     LOOK_AGAIN,
     LOOP,
+    POLYHEDRA,
+    SHARED,
     STEPPED_JOINTS,
     SUBSTEPPED,
     UNDER_FORCES,
@@ -208,14 +210,12 @@ def _move(run: Run) -> None:
     bisection.sweep(run.detector, state.trajectory, pair, 1.0 / 60.0)
 
 
-def _find_substepped_contacts(run: Run) -> None:
-    """Pairs and contacts of sub-stepped islands, before they are solved."""
-    world, state, member = run.world, run.state, np.array([False, True])
-    state.now.inv_inertia[1] = np.eye(3)
+def _stand_beside_sub_steps(run: Run) -> None:
+    """What sub-stepped islands call beside their steps: pairs, which of them are stepped, trajectories between the steps."""
+    world, state, members, member = run.world, run.state, np.array([1]), np.array([False, True])
     stepper = ContactStepper(world, world.dynamic, COARSE)
     for _ in range(2):  # The second time there is a cover.
-        stepper.set_up(run, np.array([1]), np.array([0]), STEP)
-    stepper.move_apart(run, np.array([1]), 0.0)
+        stepper.find_pairs(run, members, np.array([0]), STEP)
     stepper.near(run, member, ~member, STEP)
     stepper.table.free[:, 0] = stepper.table.free[:, 1]
     stepper.table.pack()
@@ -223,28 +223,31 @@ def _find_substepped_contacts(run: Run) -> None:
     a, b = np.array([[0, 1], [0, 1]]).T
     root = island_roots(world.num_bodies, a, b, member)
     refusals(world, root, member, ~member, member, np.zeros(world.num_bodies), (a, b), True)
-
-
-def _step_substepped(run: Run) -> None:
-    """The sub-stepped solver, and the trajectories between its steps."""
-    state, now, members = run.state, run.state.now, np.array([1])
-    stepper = ContactStepper(run.world, run.world.dynamic, COARSE)
-    stepper.members = members
     support_levels(stepper.bodies, stepper.table.pairs, stepper.table.points, TALL)
-    mark_quick(stepper.bodies, STEP, 1.0)
-    out = stepper.step(run, 0.0, STEP)
-    steady = run.world.steady_acceleration
+    steady, poses, now = world.steady_acceleration, (np.zeros((1, 3)), np.zeros((1, 4)), np.zeros((1, 6))), state.now
     end_trajectories(state.trajectory, members, 0.0, steady, now, state.rotation, run.acceleration, run.angular_acceleration)
-    depart(state.trajectory, members, 0.0, STEP, now, out.position, out.orientation, out.velocity)
+    depart(state.trajectory, members, 0.0, STEP, now, *poses)
     let_fly(state.trajectory, members, steady)
-    pair, member = np.array([0]), np.array([False, True])
-    wake_by_contact(pair, pair, member, member, now, run.world.mass, run.world.steady_strength, stepper.inner)
+    pair = np.array([0])
+    wake_by_contact(pair, pair, ~member, ~member, now, world.mass, world.steady_strength, stepper.inner)
     mark_slow(now, stepper.inner, 1.0, 1.0, np.array([False, True]))
     most_stray(now, members, stepper.pressed, stepper.reach, stepper.skin, 0.5)
-    advance_sleep_timers(
-        members, (out.position, out.orientation, out.velocity), (run.world.steady_strength, stepper.inner, stepper.skin), STEP,
-        np.zeros((2, 7)), np.zeros(2),
-    )  # fmt: skip
+    of_sleep = world.steady_strength, stepper.inner, stepper.skin
+    advance_sleep_timers(members, poses, of_sleep, STEP, np.zeros((2, 7)), np.zeros(2))
+
+
+def _step_island(run: Run, sharing: Sharing | None = None) -> None:
+    """Steps of a sub-stepped island."""
+    run.state.now.inv_inertia[1] = np.eye(3)
+    stepper = ContactStepper(run.world, run.world.dynamic, COARSE, sharing)
+    stepper.set_up(run, np.array([1]), np.array([0]), STEP)
+    stepper.move_apart(run, np.array([1]), 0.0)
+    stepper.step(run)
+
+
+def _share_island(run: Run) -> None:
+    """The same of any, however little there is to do."""
+    _step_island(run, Sharing(most_cores=2, pairs=-1, general_pairs=-1, batches=-1))
 
 
 def _jointed_box(run: Run) -> JointedIsland:
@@ -301,13 +304,12 @@ def _step_jointed(run: Run) -> None:
     joints.step(run, 0.0, STEP)
 
 
-def _find_contacts_of_any_shapes(run: Run) -> None:
-    """Contacts of a capsule in a sub-stepped island, and gaps of pairs, which tell what is inside others."""
-    stepper, members = ContactStepper(run.world, run.world.dynamic, COARSE), np.array([1])
-    run.state.now.inv_inertia[1] = np.eye(3)
-    stepper.set_up(run, members, np.array([0]), STEP)
+def _step_any_shapes(run: Run) -> None:
+    """Steps of a capsule in a sub-stepped island, and gaps of pairs, which tell what is inside others."""
     posed = Posed(0, np.zeros(3), np.eye(3)), Posed(1, np.zeros(3), np.eye(3))
     pair_gap(run.world.geometry, *posed, 1.0, np.zeros(7))
+    _step_island(run)
+    _share_island(run)
 
 
 def _hold_under_forces(run: Run) -> None:
@@ -337,10 +339,12 @@ def _go_from_event_to_event(run: Run) -> None:
 PARTS = {
     CONTACTS: (_respond_and_detect, _hold, _move_and_sweep),
     EVENTS: (_fly_balls,),
-    SUBSTEPPED: (_find_substepped_contacts, _step_substepped),
+    SUBSTEPPED: (_stand_beside_sub_steps,),
+    POLYHEDRA: (_step_island,),
+    SHARED: (_share_island,),
     JOINTS: (_start_joints, _close_and_stop_joints, _fly_on_joints, _touch_with_joints),
     STEPPED_JOINTS: (_step_jointed,),
-    ANY_SHAPES: (_find_contacts_of_any_shapes,),
+    ANY_SHAPES: (_step_any_shapes,),
     UNDER_FORCES: (_hold_under_forces,),
     LOOP: (_go_from_event_to_event,),
 }

@@ -24,7 +24,7 @@ Support function: s(n) = r sqrt(1 - (n . axis)^2) + h |n . axis|.
 
 from __future__ import annotations
 
-from math import copysign, cos, hypot, inf, pi, sin, sqrt
+from math import copysign, cos, inf, pi, sin, sqrt
 
 from rigidimpulse.collision.distance.simplices import inner, over_triangle
 from rigidimpulse.core.kernels import jit, jit_making_arrays
@@ -71,17 +71,23 @@ def cylinder_cylinder_distance(first, second, out):
 
 
 @inner
+def flat_length(x, y):
+    """Return sqrt(x^2 + y^2). The C library's `hypot` takes several times as long, a quarter of all that contacts of cylinders take."""
+    return sqrt(x * x + y * y)
+
+
+@inner
 def basis(axis):
     """Return three orthonormal vectors, the last along the unit vector `axis`; the others depend on nothing else."""
     x, y, z = axis[0], axis[1], axis[2]
     if abs(x) <= abs(y) and abs(x) <= abs(z):
-        scale = 1.0 / hypot(y, z)
+        scale = 1.0 / flat_length(y, z)
         u = (0.0, z * scale, -y * scale)
     elif abs(y) <= abs(z):
-        scale = 1.0 / hypot(x, z)
+        scale = 1.0 / flat_length(x, z)
         u = (-z * scale, 0.0, x * scale)
     else:
-        scale = 1.0 / hypot(x, y)
+        scale = 1.0 / flat_length(x, y)
         u = (y * scale, -x * scale, 0.0)
     w = (x, y, z)
     return u, cross(w, u), w
@@ -128,13 +134,13 @@ def closest_on_curve(q, tangent, radius, half):
     difference of the points, whose error grows as 1 / distance.
     """
     x, y, z = q
-    rho = hypot(x, y)
+    rho = flat_length(x, y)
     beside, beyond = rho - radius, abs(z) - half
     if beside <= 0.0 and beyond <= 0.0:
         return 0.0, q, q, ZERO
     end = copysign(1.0, z)
     out = (x / rho, y / rho, 0.0) if rho > 0.0 else (1.0, 0.0, 0.0)
-    distance = hypot(max(beside, 0.0), max(beyond, 0.0))
+    distance = flat_length(max(beside, 0.0), max(beyond, 0.0))
     p = (min(rho, radius) * out[0], min(rho, radius) * out[1], end * min(abs(z), half))
     if beside <= _ROUND_OFF * radius and beside < beyond:  # over the cap, or so close to it that the rest is rounding
         n = (0.0, 0.0, end)
@@ -156,7 +162,7 @@ def closest_on_curve(q, tangent, radius, half):
 def slope_along(q, dq, ddq, radius, half):
     """Return the first two derivatives of d^2 / 2 at the point q of a curve with derivatives dq, ddq."""
     slope, curvature = 0.0, 0.0
-    rho = hypot(q[0], q[1])
+    rho = flat_length(q[0], q[1])
     beside, beyond = rho - radius, abs(q[2]) - half
     if beside > 0.0:
         x, y = q[0] / rho, q[1] / rho
@@ -245,7 +251,7 @@ def _closest_on_face(a, b, c, radius, half):
     height = dot(m, a)
     side = copysign(1.0, height)  # n points from the centre of the cylinder to the plane
     n, height = along(ZERO, side, m), abs(height)
-    flat = hypot(n[0], n[1])
+    flat = flat_length(n[0], n[1])
     p = (radius, 0.0, copysign(half, n[2]))
     if flat > 0.0:
         p = (radius * n[0] / flat, radius * n[1] / flat, p[2])
@@ -281,7 +287,7 @@ def closest_on_cylinder(centre, axis, radius_b, half_b, radius, half):
 @inner
 def closest_sides(centre, axis, radius_b, half_b, radius, half):
     """Return the closest pair of the two sides if the axes' common perpendicular meets both; else distance inf."""
-    turn = hypot(axis[0], axis[1])
+    turn = flat_length(axis[0], axis[1])
     if turn > _PARALLEL:
         c = (-axis[1] / turn, axis[0] / turn, 0.0)
         s = dot(cross(centre, axis), c) / turn
@@ -289,7 +295,7 @@ def closest_sides(centre, axis, radius_b, half_b, radius, half):
         if abs(s) <= half and abs(t) <= half_b:
             other = along(centre, t, axis)
             foot = (0.0, 0.0, other[2])
-            length = hypot(other[0], other[1])
+            length = flat_length(other[0], other[1])
             if length <= radius + radius_b:
                 share = radius / (radius + radius_b)
                 common = (share * other[0], share * other[1], other[2])

@@ -25,7 +25,7 @@ The least distances of `distance.cylinder` can be imported from here as well:
 
 from __future__ import annotations
 
-from math import copysign, hypot
+from math import copysign
 
 from rigidimpulse.collision.distance.cylinder import (
     AXIS,
@@ -35,6 +35,7 @@ from rigidimpulse.collision.distance.cylinder import (
     cylinder_cylinder_distance,
     cylinder_support,
     cylinder_triangle_distance,
+    flat_length,
     to_axes,
 )
 from rigidimpulse.collision.distance.simplices import inner
@@ -92,7 +93,7 @@ def cylinder_half_space_gap(geometry, cylinder, half_space, pose, limit, _scratc
     m, a = _plane(geometry, solid, half_space, pose)
     gap = -dot(m, a) - cylinder_support(AXIS, solid.half, solid.radius, m)
     if gap < limit:
-        flat = hypot(m[0], m[1])
+        flat = flat_length(m[0], m[1])
         scale = -solid.radius / flat if flat > 0.0 else 0.0
         p = (scale * m[0], scale * m[1], -copysign(solid.half, m[2]))
         write_points(solid, p, along(p, -gap, m), out)

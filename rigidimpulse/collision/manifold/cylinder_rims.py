@@ -7,12 +7,12 @@ rim, the normal is q' x c.
 
 from __future__ import annotations
 
-from math import copysign, cos, hypot, inf, pi, sin, sqrt
+from math import copysign, cos, inf, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.distance.cylinder import ZERO, basis, from_axes, on_circle
+from rigidimpulse.collision.distance.cylinder import ZERO, basis, flat_length, from_axes, on_circle
 from rigidimpulse.collision.distance.simplices import inner, over_triangle
 from rigidimpulse.collision.manifold.contact_points import DEPTH, MOST_DEPTH, STRICT, TILT, Contact, append_contact
 from rigidimpulse.core.tolerances import TOLERANCES
@@ -116,7 +116,7 @@ def rims_on_plane(solid, found, count, m, corners, bound, other):
     radius, half, margin = solid.radius, solid.half, solid.margin
     border = BORDER * (radius + half)
     deepest = -inf if bound == WHOLE_PLANE else -solid.depth
-    flat = hypot(m[0], m[1])
+    flat = flat_length(m[0], m[1])
     for bottom in range(2):
         level = half - 2.0 * half * bottom
         least = level * m[2] - radius * flat - dot(m, a)
@@ -164,7 +164,7 @@ def closest_to_ring(centre, u, v, rim_radius, s, radius, level, axial):
     """
     for _ in range(_MAX_NEWTON):
         q, dq, ddq = _curve(centre, u, v, rim_radius, s)
-        rho = hypot(q[0], q[1])
+        rho = flat_length(q[0], q[1])
         x, y = q[0] / rho, q[1] / rho
         outward, around = x * dq[0] + y * dq[1], x * dq[1] - y * dq[0]
         slope = (rho - radius) * outward + axial * (q[2] - level) * dq[2]
@@ -185,7 +185,7 @@ def ring_contact(q, tangent, curvature, solid, level, skeleton):
     `skeleton`: radius by which the curve is grown. The normal lies between those of cap and side; distance and q are of
     the skeleton.
     """
-    rho = hypot(q[0], q[1])
+    rho = flat_length(q[0], q[1])
     out = (q[0] / rho, q[1] / rho, 0.0)
     p = (solid.radius * out[0], solid.radius * out[1], level)
     between = subtract(q, p)
@@ -214,8 +214,8 @@ def circle_contacts(solid, found, count, circle, bottom, other):
     """
     centre, u, v, rim_radius = circle
     radius, half, margin = solid.radius, solid.half, solid.margin
-    beside = max(0.0, hypot(centre[0], centre[1]) - radius)
-    if hypot(beside, max(0.0, abs(centre[2]) - half)) > margin + rim_radius:
+    beside = max(0.0, flat_length(centre[0], centre[1]) - radius)
+    if flat_length(beside, max(0.0, abs(centre[2]) - half)) > margin + rim_radius:
         return count
     axial = 0.0 if bottom < 0 else 1.0
     level = 0.0 if bottom < 0 else half - 2.0 * half * bottom
@@ -224,7 +224,7 @@ def circle_contacts(solid, found, count, circle, bottom, other):
     before, here = inf, inf
     for k in range(_NUM_SAMPLES + 2):  # `here` is the sample k - 1
         q = on_circle(centre, u, v, rim_radius, spacing * k)
-        after = hypot(hypot(q[0], q[1]) - radius, axial * (q[2] - level))
+        after = flat_length(flat_length(q[0], q[1]) - radius, axial * (q[2] - level))
         low = k > 1 and here <= before and here < after and here <= margin + rim_radius * spacing
         before, here = here, after
         if not low:
@@ -236,7 +236,7 @@ def circle_contacts(solid, found, count, circle, bottom, other):
                 continue
             q, tangent, inward = _curve(centre, u, v, rim_radius, s)
             if bottom < 0:
-                rho = hypot(q[0], q[1])
+                rho = flat_length(q[0], q[1])
                 n = (q[0] / rho, q[1] / rho, 0.0)
                 gap = rho - radius
                 p = (radius * n[0], radius * n[1], q[2])

@@ -5,10 +5,10 @@ See `cylinder`. The box tree is walked in the frame of the primitive, features a
 
 from __future__ import annotations
 
-from math import hypot, inf, sqrt
+from math import inf, sqrt
 from typing import NamedTuple
 
-from rigidimpulse.collision.distance.cylinder import ZERO, closest_on_curve, closest_on_triangle, from_axes, to_axes
+from rigidimpulse.collision.distance.cylinder import ZERO, closest_on_curve, closest_on_triangle, flat_length, from_axes, to_axes
 from rigidimpulse.collision.distance.simplices import edge_normals, in_edge_arc, inner
 from rigidimpulse.collision.geometry import EDGE_HIDDEN
 from rigidimpulse.collision.manifold.contact_points import Found
@@ -75,11 +75,11 @@ def _box_gap(solid, view, low, high):
     reach = (0.5 * (high[0] - low[0]), 0.5 * (high[1] - low[1]), 0.5 * (high[2] - low[2]))
     gap = -inf
     for k in range(3):
-        extent = solid.half * abs(view.z[k]) + solid.radius * hypot(view.z[(k + 1) % 3], view.z[(k + 2) % 3])
+        extent = solid.half * abs(view.z[k]) + solid.radius * flat_length(view.z[(k + 1) % 3], view.z[(k + 2) % 3])
         gap = max(gap, abs(middle[k] - view.centre[k]) - reach[k] - extent)
     x, y, z = _seen(view, middle)
     along_axis = reach[0] * abs(view.z[0]) + reach[1] * abs(view.z[1]) + reach[2] * abs(view.z[2])
-    rho = hypot(x, y)
+    rho = flat_length(x, y)
     if rho > 0.0:
         out = along(along(ZERO, x / rho, view.x), y / rho, view.y)
         across = reach[0] * abs(out[0]) + reach[1] * abs(out[1]) + reach[2] * abs(out[2])
@@ -100,7 +100,7 @@ def _corners(geometry, view, triangle):
 def _corner_gap(solid, a, b, c):
     """Return a lower bound of the distance of a triangle to the cylinder; negative if they may meet."""
     x, y = a[0] + b[0] + c[0], a[1] + b[1] + c[1]
-    size = max(hypot(x, y), 1e-300)
+    size = max(flat_length(x, y), 1e-300)
     x, y = x / size, y / size
     beside = min(x * a[0] + y * a[1], x * b[0] + y * b[1], x * c[0] + y * c[1]) - solid.radius
     return max(beside, min(a[2], b[2], c[2]) - solid.half, -max(a[2], b[2], c[2]) - solid.half)
@@ -165,7 +165,7 @@ def _vertex_contact(geometry, solid, view, found, count, vertex, skeleton):
     """Append the contact of a vertex if no edge that leaves it comes closer; over a cap that needs not be so."""
     q = _seen(view, row(geometry.vertex, vertex))
     border = BORDER * solid.radius
-    rho = hypot(q[0], q[1])
+    rho = flat_length(q[0], q[1])
     if solid.radius < rho <= solid.radius + border and abs(q[2]) > solid.half:  # in line with the rim: over the cap
         q = (q[0] * solid.radius / rho, q[1] * solid.radius / rho, q[2])
     distance, p, _, n = closest_on_curve(q, ZERO, solid.radius, solid.half)
@@ -200,7 +200,7 @@ def _edge_contacts(solid, found, count, edge, other):
     across = d[0] * d[0] + d[1] * d[1]
     nearest = -(a[0] * d[0] + a[1] * d[1]) / across if across > 0.0 else 0.0
     q = along(a, nearest, d)
-    rho = hypot(q[0], q[1])
+    rho = flat_length(q[0], q[1])
     if rho > radius + reach:
         return count
     if 0.0 < nearest < 1.0 and abs(q[2]) <= half and rho >= radius + skeleton - solid.depth:

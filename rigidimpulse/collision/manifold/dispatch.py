@@ -106,6 +106,8 @@ class Posed(NamedTuple):
     shape: int
     position: np.ndarray  # (3,) m, of the principal frame
     rotation: np.ndarray  # (3, 3)
+ALL = np.int64(0)
+"""All contacts of a pair are wanted, however many have one normal. (Which of them carry may be known later, see `contact_update`.)"""
 
 
 class PairQuery(NamedTuple):

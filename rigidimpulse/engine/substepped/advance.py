@@ -498,7 +498,7 @@ class SubsteppedIslands:
                 self.stepper.move_apart(run, fresh, time)
                 change = mechanical_energy(run.state.now, run.world.constants, members) - before
                 run.log.account(time, "position correction", change)
-            out = self.stepper.step(run, time, end)
+            out = self.stepper.step(run)
         if self.hand_over.cheapest is not None:
             self.hand_over.cheapest.note(members, self.stepper.parts)
         if out is None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
-from functools import partial
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -22,16 +20,14 @@ from rigidimpulse.collision.contact_cache import (
     make_workspace,
     most_approach,
     most_motion,
-    most_turn,
     note_changes,
     share_of,
 )
 from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT
 from rigidimpulse.collision.contact_table import ContactTable
-from rigidimpulse.collision.contact_update import Searched, SmallerShapes, ask_general, make_asked, mark_apart, store_contacts
+from rigidimpulse.collision.contact_update import Asked, SmallerShapes, make_asked, mark_apart
 from rigidimpulse.collision.fat_boxes import BodyBounds, FatBoxes
 from rigidimpulse.collision.geometry import Shapes
-from rigidimpulse.collision.manifold.contact_points import TILT
 from rigidimpulse.collision.manifold.dispatch import GENERAL, PairQuery, Posed, pair_gap
 from rigidimpulse.collision.manifold.inset_surface import inset_surfaces
 from rigidimpulse.collision.manifold.penetrating import solids
@@ -45,31 +41,59 @@ from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.workers import empty_work_queue
 from rigidimpulse.dynamics.impact.restitution import LAWS
 from rigidimpulse.dynamics.solvers.tgs_soft.bodies import SolverBodies, load_bodies
-from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick, note_pressed
+from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import note_pressed
 from rigidimpulse.dynamics.solvers.tgs_soft.depenetration import move_apart
 from rigidimpulse.dynamics.solvers.tgs_soft.energy_balance import (
     Weights,
     begin_balance,
-    connect,
     end_balance,
     make_balance,
     pay_for_rise,
 )
-from rigidimpulse.dynamics.solvers.tgs_soft.fill import fill, keep_impulses, place_bodies
-from rigidimpulse.dynamics.solvers.tgs_soft.records import (
-    POINTS,
-    Batches,
-    colour_patches,
-    empty_patches,
-    leave_out_quick,
-    list_patches,
-    more_batches,
-    more_patches,
-    place_patches,
-)
-from rigidimpulse.dynamics.solvers.tgs_soft.solver import FREQUENCY, Solve, SpecialPatches, advance, softness, special_patches
+from rigidimpulse.dynamics.solvers.tgs_soft.records import POINTS, Batches, empty_patches, more_batches, more_patches
+from rigidimpulse.dynamics.solvers.tgs_soft.solver import FREQUENCY, softness
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.substepped.sharing import Sharing
+from rigidimpulse.engine.substepped.stages import (
+    ASK,
+    AT_STAGE,
+    COLUMNS,
+    END,
+    FIND,
+    FOUND,
+    IS_AGAIN,
+    KEEP,
+    LEAST_SUB_STEPS_BETWEEN,
+    LEFT,
+    LENGTH,
+    LIST,
+    LOOKED_AT,
+    MARK,
+    MORE_ASKED,
+    MORE_COLOURS,
+    MORE_CONTACTS,
+    MORE_PATCHES,
+    MORE_PLACES,
+    MORE_POINTS,
+    NEEDED,
+    NEEDS_GENERAL,
+    NEXT,
+    PLAN,
+    SHARE,
+    SOME,
+    STAGE,
+    STORE,
+    WAITING,
+    General,
+    Island,
+    Memory,
+    Step,
+    go_on,
+    go_on_with_polyhedra,
+    pieces_of,
+    work_on,
+)
+from rigidimpulse.engine.warm_up import has_other_shapes
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.evaluate import refresh_pose
 
@@ -84,25 +108,12 @@ heavy one by impulses that sub-steps find bit by bit. A box under a ball of 25 t
 SPAN = 1.0
 """Longest time that is stepped at once, in sqrt(r / g) of the smallest inner radius r."""
 CROSSED = TOLERANCES.sub_stepping.crossed
-LEAST_SUB_STEPS_BETWEEN = 2
-"""Sub-steps from look to look."""
-COARSEST = 0.3
-"""Inner radii by which bodies with inset surfaces may pass each other from look to look: sub-steps are made shorter for it."""
-TURNED = 2.0 * TILT
-"""Angle by which meshes may turn against each other from look to look, rad: of their corners those that come down by less are found. A die
-that turned by twice that over an edge, in a cup, was 3.5 mm inside of it."""
 MOST_LOOKS = 1024
 """Looks for contacts in what is stepped at once that speed may ask for. Beyond that an island would cost more than it advances: a light
 rod that a heavy press had spun up to 15,000 rad/s took 60,000 sub-steps in 1/60 s. Bodies may then pass each other: the status says so."""
 SAME, KEPT = 0.02, 0.2
 """Parts of the motion until a look (`Accuracy.substep_motion`) that a pair may make with the contacts it has: at any time, and in the
 middle of a step."""
-QUICK = 0.4
-"""Part of `kept` beyond which a body is quick: its contacts are looked for, and their records made, again in the middle of a step."""
-MOSTLY = 0.3
-"""Part of the bodies that are quick beyond which all count as such."""
-_NO_STEADY = 0, np.zeros(1, np.int64)
-"""Patches, and edges of the colours of batches, that were made before the last find_contacts."""
 TOO_FAST_REMEDY = "contacts would have to be looked for {looks} times in {ahead:.2g} s, and were {most} times; use a smaller step"
 CLEAR = 0.2
 """Inner radii within which bodies may meet, beside the way they go."""
@@ -173,8 +184,8 @@ class ContactStepper:
         step_length: s, that is stepped at once at most; motion: inner radii, see `Accuracy.substep_motion`.
         kept: inner radii that a pair may come past each other with the contacts it has, in the middle of a step.
         straight: skins by which trajectories may stray from the ways of turning bodies.
-        bodies: by rank. table: pairs and contact points. balance: of their energy. sub_steps, parts: of the step that is set up; between
-            parts contacts are looked for again. pressed: (n,) bool, contacts acted on the body when it was last stepped.
+        bodies: by rank. table: pairs and contact points. balance: of their energy.
+        pressed: (n,) bool, contacts acted on the body when it was last stepped.
 
     """
 
@@ -202,6 +213,7 @@ class ContactStepper:
         inset, depth, back = inset_surfaces(world.shapes, world.geometry, convex, dynamic_shapes)
         self.geometry, factor = shrunk_geometry(inset, world.convex_depths, dynamic_shapes)
         self.shapes = make_polyhedra(world.geometry, convex, several=several_polyhedra(world.geometry))
+        self._has_general = has_other_shapes(world)
         solid_shapes, drum, inset_of_solids = solids(world.shapes, world.geometry, convex, self.shapes)
         convex |= drum
         kinds = world.shape_of_body[self.order]
@@ -214,19 +226,19 @@ class ContactStepper:
         self.bodies = self._make_bodies()
         self._weights = Weights(world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order]))
         self.balance = make_balance(n)
-        self._shares, self._looked_at = self._sharing.most_cores, 0
+        self._shares = self._sharing.most_cores
         self._workspaces = [make_workspace() for _ in range(self._shares)]
-        self._buffers: list[ContactBuffer] = []
+        self._buffers = [ContactBuffer(self._sharing.buffer, keeps=True)]
         self.table = ContactTable(self._shares, n, self._sharing.first_points, self._sharing.points_of_a_body)
         least = CLEAR * np.where(movable, self.inner, 0.0)
         moves = world.dynamic | world.moving
         bounds = BodyBounds(self.order, moves, world.bound_radius, self.inner, least, world.static_min, world.static_max)
         self.fat_boxes = FatBoxes(bounds, world.dynamic, world.may_collide if len(world.apart) else None)
         self.simd, patches = self._sharing.simd, self._sharing.patches_of_a_body * n
-        self._patches, self._count, self._steady = empty_patches(patches), 0, _NO_STEADY
+        self._patches, (self._lists, self._target) = empty_patches(patches), _special_lists(patches)
         none = Batches(np.zeros(0, np.float32), np.zeros(0), *np.zeros((4, 0), np.int32))
         self._batches = more_batches(none, patches // self.simd.width + 1, self.simd.width)
-        self._begins, self._edges = np.zeros(256, np.int64), np.zeros(1, np.int64)
+        self._begins = np.zeros(256, np.int64)
         self._work_queue = empty_work_queue()
         self._places_of_bodies = aligned(n + 1)
         self._part = np.zeros(n, np.int64)
@@ -237,11 +249,19 @@ class ContactStepper:
         self.kept = KEPT * self.motion
         # Balls and moving supports: all contacts are found again in the middle of a step.
         self._all_quick = bool(world.moving.any() or world.ball.any())
-        self._special = self._all_quick or bool(world.coefficients[:, :, :2].any())
+        is_special = self._all_quick or bool(world.coefficients[:, :, :2].any())
         self.pressed = np.zeros(n, bool)
         self._places, self._margins = np.zeros(0, np.int64), np.zeros(0)
-        self.members, self.ahead, self.parts, self.sub_steps, self._pull = np.zeros(0, np.int64), 0.0, 1, 1, 0.0
-        self._usual = self.step_length
+        self.members, self._progress = np.zeros(0, np.int64), np.zeros(COLUMNS, np.int64)
+        self._island = Island(
+            self._convex, self.bodies, self.balance, self.order, self._cornered, world.coefficients
+        )
+        self._step = Step(
+            h=0.0, ahead=0.0, same=SAME * self.motion, first_kept=0.0, kept=self.kept, fall=0.0, strength=0.0, soft=np.zeros((2, 3)),
+            sub_steps=1, parts=1, law=LAWS[world.accuracy.restitution], all_quick=self._all_quick, is_special=is_special,
+            most_cores=self._shares, many_pairs=self._sharing.pairs, many_general=self._sharing.general_pairs,
+            many_batches=self._sharing.batches,
+        )  # fmt: skip
 
     def _make_bodies(self) -> SolverBodies:
         """Rows of all bodies by rank, and one of none."""
@@ -308,20 +328,41 @@ class ContactStepper:
         self._part[supports], self._part[members] = SUPPORT, MEMBER
         fineness = fineness or Fineness(self.sub_step(members) / self._unlike(), self.motion)
         load_bodies(self.bodies, self.order, run.state.now, run.acceleration, self.world.inv_mass, self._part)
-        self._pull = float(self.world.steady_strength[members].max(initial=0.0))
-        self._note_changes(ahead)
-        motion = most_motion(self.bodies, self.table.pairs, ahead)
+        pairs, strength = self.table.pairs, float(self.world.steady_strength[members].max(initial=0.0))
+        fall = 0.5 * ahead * strength
+        note_changes(self.bodies, pairs, ahead, fall, self.world.coefficients)
+        motion = most_motion(self.bodies, pairs, ahead)
         # Fast bodies are looked at more often, with enough sub-steps between the looks. So are those that come from farther than
         # contacts are looked for: a big ball met small bricks only when it was a third inside of them (issue 28).
-        needed = math.ceil(max(self._pieces(motion, ahead), most_approach(self.bodies, self.table.pairs, ahead, self._fall(ahead))))
+        pieces = pieces_of(self.bodies, pairs, self._cornered, motion, ahead)
+        needed = math.ceil(max(pieces, most_approach(self.bodies, pairs, ahead, fall)))
         if needed > MOST_LOOKS:
             self._report_fastest(run, members, needed, ahead)
             needed = MOST_LOOKS
-        self.sub_steps = max(math.ceil(ahead / fineness.sub_step - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
-        most = max(self.sub_steps // LEAST_SUB_STEPS_BETWEEN, 1)
-        self.parts = min(max(math.ceil(motion / fineness.motion), needed, 1), most)
-        self.ahead, self._usual = ahead / self.parts, fineness.sub_step
-        self._look(run, kept)
+        sub_steps = max(math.ceil(ahead / fineness.sub_step - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
+        parts = min(max(math.ceil(motion / fineness.motion), needed, 1), max(sub_steps // LEAST_SUB_STEPS_BETWEEN, 1))
+        part, h = ahead / parts, ahead / sub_steps
+        self._step = self._step._replace(
+            h=h, ahead=part, first_kept=kept, fall=0.5 * part * strength, strength=strength, soft=softness(h, fineness.sub_step),
+            sub_steps=sub_steps, parts=parts, all_quick=self._all_quick,
+        )  # fmt: skip
+        capacity = share_of(len(pairs.first), self._shares, self._shares)
+        if capacity > len(self._places):
+            self._places, self._margins = reserve((2 * capacity,), np.int64), reserve((2 * capacity,), np.float64)
+        looked_at = self._progress[LOOKED_AT]
+        self._progress[:] = 0
+        self._progress[[STAGE, LENGTH, LEFT, LOOKED_AT]] = FIND, sub_steps // parts, sub_steps // parts, looked_at
+        self._go_on(run, PLAN)
+
+    @property
+    def parts(self) -> int:
+        """Parts of the step that is set up: contacts are looked for again between them."""
+        return self._step.parts
+
+    @property
+    def sub_step_length(self) -> float:
+        """Length of its sub-steps, s."""
+        return self._step.h
 
     def _report_fastest(self, run: Run, members: np.ndarray, looks: int, ahead: float) -> None:
         """Say that a member moves too fast: the one whose surface passes most of its own inner radii."""
@@ -331,27 +372,76 @@ class ContactStepper:
         message = TOO_FAST_REMEDY.format(looks=looks, ahead=ahead, most=MOST_LOOKS)
         run.log.report(run.state.time, "too fast for sub-steps", (self.world.names[i],), message)
 
-    def _pieces(self, motion: float, ahead: float) -> float:
-        """Pieces into which `ahead` s is cut, so that pairs that have contacts are looked at often enough; motion: see `most_motion`."""
-        return max(motion / COARSEST, most_turn(self.bodies, self.table.pairs, self._cornered, ahead) / TURNED)
+    def _go_on(self, run: Run, last: int) -> None:
+        """Go on with the step that is set up to the stage `last`, or to its end."""
+        how = self._try_stages(last)
+        while how != AT_STAGE:
+            if how == SHARE:
+                self._share_stage(run)
+            else:
+                self._make_space(how, int(self._progress[NEEDED]))
+            how = self._try_stages(last)
 
-    def _fall(self, ahead: float) -> float:
-        """Half of what steady forces may add to a speed in `ahead` s, m/s."""
-        return 0.5 * ahead * self._pull
+    def _try_stages(self, last: int) -> int:
+        """Go on as far as memory and one core go; returns why not farther."""
+        if not self._has_general:
+            return go_on_with_polyhedra(self.simd, self._island, self._memory(), self._step, self._progress, last)
+        return go_on(self.simd, self._island, self._memory(), self._general(), self._step, self._progress, last)
 
-    def _note_changes(self, ahead: float) -> None:
-        """Note how much contacts may change velocities in `ahead` s."""
-        note_changes(self.bodies, self.table.pairs, ahead, self._fall(ahead), self.world.coefficients)
+    def _memory(self) -> Memory:
+        """The arrays as they are now."""
+        table = self.table
+        return Memory(
+            table.arrays, table.lines, self._places, self._margins, self._workspaces[0], self._patches, self._lists, self._target,
+            self._batches, self._begins, self._places_of_bodies, self._work_queue,
+        )  # fmt: skip
 
-    def _look(self, run: Run, kept: float) -> None:
-        """Look at the contacts of all pairs in play, on several cores where the last look had much to do; kept: see `review`."""
-        table, number = self.table, len(self.table.pairs.first)
-        shares = self._shares if self._looked_at > self._sharing.pairs else 1
-        capacity = share_of(number, shares, shares)
-        if capacity > len(self._places):
-            self._places, self._margins = reserve((2 * capacity,), np.int64), reserve((2 * capacity,), np.float64)
+    def _general(self) -> General:
+        """What general pairs need."""
+        shapes = Shapes(self.geometry, self.world.shape_of_body)
+        return General(self._smaller, shapes, self._taken_off, self._asked, self._buffers[0].contacts)
+
+    def _make_space(self, how: int, needed: int) -> None:
+        """Make space for what had none."""
+        if how == NEEDS_GENERAL:
+            self._has_general = True
+        elif how == MORE_PLACES:
+            self._workspaces = [make_workspace(2 * needed) for _ in self._workspaces]
+            self.table.grow(2 * needed)
+        elif how == MORE_POINTS:
+            self.table.grow(needed)
+        elif how == MORE_ASKED:
+            self._asked = make_asked(2 * needed, self.world.num_bodies)
+        elif how == MORE_CONTACTS:
+            self._buffers[0].grow(needed)
+        elif how == MORE_PATCHES:
+            self._patches = more_patches(self._patches, needed)
+            self._lists, self._target = _special_lists(needed)
+        elif how == MORE_COLOURS:
+            self._begins = np.concatenate([self._begins, np.zeros(needed, np.int64)])
+        else:
+            self._batches = more_batches(self._batches, needed, self.simd.width)
+
+    def _share_stage(self, run: Run) -> None:
+        """Do the present stage of the step."""
+        stage = self._progress[STAGE]
+        if stage == FIND:
+            self._find_contacts()
+        elif stage == MARK:
+            self._look_at_general(run)
+        else:
+            self._work_queue[:] = empty_work_queue()
+            self._sharing.call(work_on, [
+                (self.simd, self._island, self._memory(), self._step, self._progress, share, self._sharing.solvers)
+                for share in range(min(self._shares, self._sharing.solvers))
+            ])  # fmt: skip
+            self._progress[STAGE] = KEEP
+
+    def _find_contacts(self) -> None:
+        """Find the contacts of pairs that are not general, on several cores."""
+        table, step, progress, shares = self.table, self._step, self._progress, self._shares
+        limits = Limits(step.ahead, step.same, step.kept if progress[IS_AGAIN] else step.first_kept, step.fall)
         while True:
-            limits = Limits(self.ahead, SAME * self.motion, kept, self._fall(self.ahead))
             outcome = self._sharing.call(find_contacts, [
                 (
                     self._convex, self.bodies, table.arrays, Share(share, shares, self._places, self._margins), limits,
@@ -363,50 +453,47 @@ class ContactStepper:
             lacks = min(waiting for _, waiting in outcome)
             if lacks >= 0:
                 break
-            if lacks == TOO_FEW_PLACES:
-                self._workspaces = [make_workspace(2 * len(workspace.parts.real)) for workspace in self._workspaces]
-            table.grow(len(self._workspaces[0].parts.real))
-        self._looked_at = sum(looked_at for looked_at, _ in outcome)
-        if shares == 1:
-            waits = slice(0, outcome[0][1])
-        else:
-            begins = [share_of(number, share, shares) for share in range(shares)]
-            waits = np.concatenate([np.arange(begin, begin + waiting) for begin, (_, waiting) in zip(begins, outcome, strict=True)])
-            # In order of the pairs, however many shares there are.
-            waits = waits[np.argsort(self._places[waits])]
-        if len(self._places[waits]):
-            self._look_at_general(run, self._places[waits], self._margins[waits])
+            self._make_space(int(MORE_PLACES if lacks == TOO_FEW_PLACES else MORE_POINTS), len(self._workspaces[0].parts.real))
+        begins = [share_of(len(table.pairs.first), share, shares) for share in range(shares)]
+        waits = np.concatenate([np.arange(begin, begin + waiting) for begin, (_, waiting) in zip(begins, outcome, strict=True)])
+        # In order of the pairs, however many shares there are.
+        waits = waits[np.argsort(self._places[waits])]
+        self._places[: len(waits)], self._margins[: len(waits)] = self._places[waits], self._margins[waits]
+        progress[LOOKED_AT], progress[WAITING] = sum(looked_at for looked_at, _ in outcome), len(waits)
+        progress[STAGE] = ASK if len(waits) else PLAN
 
-    def _look_at_general(self, run: Run, places: np.ndarray, margin: np.ndarray) -> None:
-        """Find the contacts of pairs at `places` within margins (k,) m by the kernels of `collision.manifold`."""
-        table, world, count = self.table, self.world, len(places)
-        if count > len(self._asked.a):
-            self._asked = make_asked(2 * count, world.num_bodies)
-        asked, smaller = self._asked, self._smaller
-        ask_general(smaller, self._taken_off, self.bodies, table.pairs, places, margin, self.order, asked)
-        now = run.state.now._replace(position=asked.position, orientation=asked.orientation)
-        shares, is_apart = self._shares if count > self._sharing.general_pairs else 1, np.zeros(count, bool)
-        if self._depth.any():
-            edges = pairwise(count * share // shares for share in range(shares + 1))
-            self._sharing.call(mark_apart, [
-                (smaller, world.shape_of_body, self.bodies, asked, table.pairs, places, edge, is_apart) for edge in edges
-            ])  # fmt: skip
-        while len(self._buffers) < self._shares:
-            self._buffers.append(ContactBuffer(self._sharing.buffer, keeps=True))
+    def _look_at_general(self, run: Run) -> None:
+        """Find the contacts of general pairs that have been asked about, on several cores."""
+        count, asked, shares, buffers = int(self._progress[WAITING]), self._asked, self._shares, self._buffers
+        of_body, pairs, places = self.world.shape_of_body, self.table.pairs, self._places[: count]
+        self._sharing.call(mark_apart, [
+            (self._smaller, of_body, self.bodies, asked, pairs, places, (count * share // shares, count * (share + 1) // shares))
+            for share in range(shares)
+        ])  # fmt: skip
+        while len(buffers) < shares:
+            buffers.append(ContactBuffer(self._sharing.buffer, keeps=True))
         # A pair goes to the same buffer each time: what is near is kept there.
-        share = (asked.a[:count] + asked.b[:count]) % self._shares
-        parts = [np.flatnonzero((share == k) & ~is_apart) for k in range(self._shares)]
-        shapes = Shapes(self.geometry, world.shape_of_body)
+        share = (asked.a[:count] + asked.b[:count]) % shares
+        parts = [np.flatnonzero((share == k) & ~asked.is_apart[:count]) for k in range(shares)]
+        now = run.state.now._replace(position=asked.position, orientation=asked.orientation)
+        shapes = Shapes(self.geometry, of_body)
         questions = [
             Question(shapes, now, asked.rotation, PairQuery(asked.a[part], asked.b[part], asked.shown[part])) for part in parts
         ]  # fmt: skip
-        for part, buffer, found in zip(parts, self._buffers, find_together(self._buffers, questions, shares > 1), strict=True):
-            # Beside what was found, bodies that sank get contacts of their own, and each row is written before it is known to be kept.
-            table.grow(found + POINTS * len(part) + 1)
-            store_contacts(
-                smaller, self.bodies, table.arrays, Searched(places[part], margin[part], asked.far[part]), (buffer.real, buffer.integer),
-                found, self.order, world.coefficients,
-            )  # fmt: skip
+        for part, buffer, found in zip(parts, buffers, find_together(buffers, questions), strict=True):
+            self._store(places[part], self._margins[part], asked._replace(far=asked.far[part]), buffer, found)
+
+    def _store(self, places: np.ndarray, margins: np.ndarray, asked: Asked, buffer: ContactBuffer, found: int) -> None:
+        """Put the contacts of general pairs (k,) into the table."""
+        progress = self._progress
+        progress[[STAGE, WAITING, FOUND]] = STORE, len(places), found
+        while True:
+            memory = self._memory()._replace(places=places, margins=margins)
+            general = self._general()._replace(asked=asked, contacts=buffer.contacts)
+            how = go_on(self.simd, self._island, memory, general, self._step, progress, PLAN)
+            if how == AT_STAGE:
+                return
+            self._make_space(how, int(progress[NEEDED]))
 
     def inside_others(self, run: Run, asked: np.ndarray) -> np.ndarray:
         """Which bodies (n,) bool of those asked for, brought to the present, have true surfaces inside others, where theirs are inset.
@@ -444,41 +531,6 @@ class ContactStepper:
                     "the bodies are deeper inside each other than their contacts can tell; use a smaller step",
                 )  # fmt: skip
 
-    def _look_again(self, run: Run) -> None:
-        """Find the contacts of quick bodies again in the middle of a step; those of all others stay in the steady batches."""
-        bodies, width = self.bodies, self.simd.width
-        all_quick = self._all_quick or mark_quick(bodies, self.ahead, QUICK * self.kept) > MOSTLY
-        if all_quick:
-            bodies.quick[:] = True
-        self._note_changes(self.ahead)
-        self._look(run, self.kept)
-        # All batches are made again: what has drifted counts from here.
-        if all_quick:
-            bodies.drift[:] = 0.0
-            self._steady = _NO_STEADY
-        leave_out_quick(width, bodies, self.table.pairs, self._patches, self._steady[0], self._batches)
-
-    def _fill(self, h: float) -> int:
-        """Make patches, colours and records of quick bodies after the steady ones, for sub-steps of h s; returns the number of batches."""
-        bodies, table, width, (begin, edges) = self.bodies, self.table, self.simd.width, self._steady
-        first = int(edges[-1])
-        count = list_patches(bodies, table.pairs, table.points, self._patches, begin)
-        if count < 0:
-            self._patches = more_patches(self._patches, -2 * count)
-            count = list_patches(bodies, table.pairs, table.points, self._patches, begin)
-        self._count = count
-        number, colours = colour_patches(width, bodies, table.pairs, self._patches, begin, count, first, self._begins)
-        if colours < 0:
-            self._begins = np.zeros(1 - 2 * colours, np.int64)
-            number, colours = colour_patches(width, bodies, table.pairs, self._patches, begin, count, first, self._begins)
-        if number > len(self._batches.points):
-            self._batches = more_batches(self._batches, 2 * number, width)
-        self._edges = np.concatenate([edges[:-1], self._begins[: colours + 1]])
-        place_patches(width, bodies, table.pairs, self._patches, (begin, count), self._batches, (first, number))
-        place_bodies(bodies, self._places_of_bodies)
-        fill(self.simd, self._batches, first, number, self._places_of_bodies, bodies.mass, table.lines, softness(h, self._usual))
-        return number
-
     def move_apart(self, run: Run, fresh: np.ndarray, time: float) -> None:
         """Move members that are fresh apart from each other and from all else to the gaps of contacts; their speeds pay."""
         bodies, now, at = self.bodies, run.state.now, self.rank[fresh]
@@ -495,44 +547,29 @@ class ContactStepper:
         now.velocity[self.members], now.angular_velocity[self.members] = velocity[:, :3], velocity[:, 3:6]
         refresh_pose(fresh, now, run.state.rotation, self.world.inertia)
 
-    def step(self, run: Run, time: float, end: float) -> Outcome:
-        """Step what `set_up` put before the kernels from `time` to `end`."""
-        h = (end - time) / self.sub_steps
+    def step(self, run: Run) -> Outcome:
+        """Step what `set_up` put before the kernels."""
         self.begin_step()
-        self._steady = _NO_STEADY
-        for some in self.sub_steps_between(partial(self._look_again, run)):
-            self._advance(some, h)
+        self._go_on(run, END)
         note_pressed(self.bodies, self.order, self.pressed)
         out = self.end_step()
         out.given[:] = 0.0
         return out
 
-    def sub_steps_between(self, look_again: Callable[[], None]) -> Iterator[int]:
-        """Sub-steps from look to look, of a step that begins with a look; in between it looks again.
-
-        What a look has found may be faster than what was known when the parts of the step were made: then a part is cut into more.
-        """
-        looked = True
-        for part in range(self.parts):
-            length = left = (part + 1) * self.sub_steps // self.parts - part * self.sub_steps // self.parts
-            while left:
-                if not looked:
-                    look_again()
-                ahead = self.ahead * left / length
-                # Speeds may be no numbers by now: the end of the step finds them.
-                pieces = max(math.ceil(min(left, self._pieces(most_motion(self.bodies, self.table.pairs, ahead), ahead))), 1)
-                some = min(max(left // pieces, LEAST_SUB_STEPS_BETWEEN), left)
-                yield some
-                left, looked = left - some, False
+    def sub_steps_between(self, run: Run, hand_over: Callable[[], None]) -> Iterator[int]:
+        """Numbers of sub-steps, which the caller makes, from look to look of a step; hand_over: called before each look."""
+        progress = self._progress
+        self._step = self._step._replace(all_quick=True)
+        self._go_on(run, LIST)
+        while progress[STAGE] != END:
+            yield int(progress[SOME])
+            hand_over()
+            progress[STAGE] = NEXT
+            self._go_on(run, LIST)
 
     def begin_step(self) -> None:
         """Remember the energies of the members."""
         begin_balance(self.balance, self.bodies, self._weights)
-
-    def look_again_at_all(self, run: Run) -> None:
-        """Find the contacts of all bodies again in the middle of a step."""
-        self._note_changes(self.ahead)
-        self._look(run, self.kept)
 
     def end_step(self) -> Outcome:
         """Balance the energy, and say where the members are."""
@@ -545,30 +582,7 @@ class ContactStepper:
             members, bodies.position[at], bodies.orientation[at], velocity, balance.taken[at], balance.raised[at], given
         )  # fmt: skip
 
-    def _advance(self, sub_steps: int, h: float) -> None:
-        """Sub-steps of h s with the contacts as they are known."""
-        bodies, table, width = self.bodies, self.table, self.simd.width
-        number, steady = self._fill(h), len(self._steady[1]) - 1
-        connect(self.balance, bodies, table.pairs, self._patches, self._count)
-        solve = Solve(bodies, table.pairs, self._patches, self._batches, table.points, self._edges, steady)
-        lists, target = np.empty((3, 2 * self._count), np.int64), np.empty((self._count, POINTS))
-        law = LAWS[self.world.accuracy.restitution]
-        balls = rebounds = supports = 0
-        if self._special:
-            strength = float(self.world.steady_strength[self.members].max())
-            balls, rebounds, supports = special_patches(
-                width, solve, self._steady[0], self._count, self.world.coefficients, strength, lists, target
-            )
-        special = SpecialPatches(
-            lists[0, :balls], lists[1, :rebounds], lists[2, :supports], target, self.world.coefficients, law, self.balance.given
-        )
-        shares = min(self._shares, self._sharing.solvers) if number * sub_steps > self._sharing.batches else 1
-        self._work_queue[:] = empty_work_queue()
-        self._sharing.call(advance, [
-            (self.simd, solve, special, sub_steps, h, self._work_queue, share, shares) for share in range(shares)
-        ])  # fmt: skip
-        keep_impulses(self.simd, self._batches, number, table.lines)
-        # The first part of a step has all contacts in its batches: they are the steady ones of later parts.
-        if not steady:
-            bodies.quick[:] = False
-            self._steady = self._count, self._edges
+
+def _special_lists(patches: int) -> tuple[np.ndarray, np.ndarray]:
+    """Lists of special patches, and their targets, of as many patches."""
+    return reserve((3, 2 * patches), np.int64), reserve((patches, POINTS), np.float64)

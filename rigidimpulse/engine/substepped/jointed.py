@@ -76,7 +76,7 @@ class JointedStepper:
         moment, given = np.zeros((len(self._joints.body_a), 3)), np.zeros((len(stepper.table.pairs.first), 10))
         stepper.begin_step()
         kept = Kept(self._stiffening, moment, self._driven, np.zeros(1), given)
-        worst = self._sub_steps(run, island, kept, (end - time) / stepper.sub_steps)
+        worst = self._sub_steps(run, island, kept)
         if not worst <= self._open:
             return None
         stop_island(island, stepper.bodies, stepper.table.arrays, self._world.coefficients, stepper.balance, kept)
@@ -103,15 +103,10 @@ class JointedStepper:
             self._joints, which, now, stepper.bodies.rotation, members, self._column, run.joints.memory, self._allowed
         )
 
-    def _sub_steps(self, run: Run, island: JointedIsland, kept: Kept, h: float) -> float:
-        """All sub-steps of h s; returns the worst gap of a joint, m or rad."""
-        stepper, worst = self._stepper, 0.0
-
-        def look_again() -> None:
-            self._hand_over(island.members)
-            stepper.look_again_at_all(run)
-
-        for some in stepper.sub_steps_between(look_again):
+    def _sub_steps(self, run: Run, island: JointedIsland, kept: Kept) -> float:
+        """All sub-steps; returns the worst gap of a joint, m or rad."""
+        stepper, worst, h = self._stepper, 0.0, self._stepper.sub_step_length
+        for some in stepper.sub_steps_between(run, lambda: self._hand_over(island.members)):
             halved, gap = step_island(
                 island, stepper.bodies, stepper.table.arrays, self._world.coefficients, stepper.balance, kept, some, h
             )
