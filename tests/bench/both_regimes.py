@@ -1,7 +1,9 @@
-"""The sub-stepped regime against the exact one on random scenes: `python tests/bench/both_regimes.py [FIRST] [--scenes N] [--limit S]`.
+"""The sub-stepped regime against the exact one on random scenes:
+`python tests/bench/both_regimes.py [FIRST] [--scenes N] [--limit S] [--solver NAME]`.
 
 A scene has 12 to 60 bodies of one restitution and one friction, drawn by its seed: boxes, balls, capsules, cylinders, hulls, and in a third
-of the scenes concave corners. They fall on a floor, or into a tray. Each runs with contact_solver "newton" and "substepped". Compared are
+of the scenes concave corners. They fall on a floor, or into a tray. Each runs with contact_solver "newton" and with "substepped", or
+another one. Compared are
 
     lost     E(0) - E(t), the energy of motion and place that is lost until the first body rests in the exact run
     depth    of bodies inside each other in the sub-stepped run, at frames that are chosen evenly, by the measure that runs end with; of the
@@ -99,11 +101,11 @@ def first_rest(run: ri.Recording) -> int:
     return min(min(frames), len(run.times) - 1)
 
 
-def compare(seed: int) -> tuple[str, float, float]:
-    """A line about a seed, the difference of energies and the depth."""
+def compare(seed: int, solver: str) -> tuple[str, float, float]:
+    """A line about a seed, the difference of energies and the depth; solver: that is compared with exact contact."""
     scene = make_scene(seed)
     exact = ri.simulate(scene, DURATION, accuracy=ri.Accuracy(contact_solver="newton"))
-    soft = ri.simulate(scene, DURATION, accuracy=ri.Accuracy(contact_solver="substepped"))
+    soft = ri.simulate(scene, DURATION, accuracy=ri.Accuracy(contact_solver=solver))
     frame = first_rest(exact)
     lost = [float(run.ledger.total[0] - run.ledger.total[frame]) for run in (exact, soft)]
     record = record_of_recording(soft)
@@ -124,13 +126,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("first", type=int, nargs="?", default=0)
     parser.add_argument("--scenes", type=int, default=SCENES)
+    parser.add_argument("--solver", default="substepped", help="contact_solver that is compared with \"newton\"")
     parser.add_argument("--limit", type=int, default=90, help="s of processor time for both runs of a scene")
     options = parser.parse_args()
     found: list[tuple[float, float]] = []
     for seed in range(options.first, options.first + 2 * options.scenes):
         if len(found) == options.scenes:
             break
-        told = apart(compare, seed, seconds=options.limit)
+        told = apart(compare, seed, options.solver, seconds=options.limit)
         print(f"seed {seed}: {told}" if isinstance(told, str) else told[0], flush=True)
         if not isinstance(told, str):
             found.append(told[1:])
