@@ -119,7 +119,7 @@ class SubsteppedIslands:
         self._ends: dict[int, float] = {}
         self._began: dict[int, _Began] = {}
         self._outcome: Outcome | None = None
-        self._outcome_end = 0.0
+        self._outcome_begin = self._outcome_end = 0.0
         self._most = self._steps = 0
         self._refused: dict[str, int] = {}
 
@@ -393,7 +393,7 @@ class SubsteppedIslands:
         hit = [island for island in islands if np.any(self.label[island.members] >= 0)]
         members = np.flatnonzero(pair_events.inside) if first else np.union1d(self._due(pair_events, time), lost)
         if len(members) and not hit:
-            bare = island_without_contacts(time, np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
+            bare = _bare_island(time)
             self._bring_in(run, bare, members)
             return [*islands, bare]
         # An island that is hit is stepped again, with all of its members; what else is due comes with the first, once.
@@ -426,6 +426,25 @@ class SubsteppedIslands:
 
     def contact_forces(self, run: Run, pair_events: PairEvents, island: Island) -> None:
         """Step an island from its time to the end of the step, with what touches it and is slow."""
+        self._contact_forces(run, pair_events, island)
+        # Where all bodies are stepped, nothing can happen before the next trajectories begin: the loop is not asked.
+        while self._outcome is not None and self._outcome_end < pair_events.end and self._has_all(run, pair_events, island):
+            self.begin_trajectories(run, pair_events, island)
+            members = self._due(pair_events, self._outcome_end)
+            pair_events.wake[members] = np.inf
+            island = _bare_island(self._outcome_end)
+            self._bring_in(run, island, members)
+            self._contact_forces(run, pair_events, island)
+
+    def _has_all(self, run: Run, pair_events: PairEvents, island: Island) -> bool:
+        """Whether all movable bodies are stepped together with an island, and have no joints, which the loop would close and stop."""
+        assert island.substepped is not None
+        if self._jointed.any():
+            return False
+        return len(island.substepped) == np.count_nonzero(run.world.dynamic) == np.count_nonzero(pair_events.inside)
+
+    def _contact_forces(self, run: Run, pair_events: PairEvents, island: Island) -> None:
+        """Step an island from its time until its trajectories must begin again."""
         world, members = run.world, island.substepped
         assert members is not None
         run.contact_log.close(np.union1d(island.members, members), island.time)
@@ -460,7 +479,7 @@ class SubsteppedIslands:
         self._steps += len(parts)
         outcomes = [self._step(run, part, np.intersect1d(fresh, part), (island.time, end), kept) for part in parts]
         stepped = [out for out in outcomes if out is not None]
-        self._outcome, self._outcome_end = joined_outcomes(stepped) if stepped else None, end
+        self._outcome, self._outcome_begin, self._outcome_end = joined_outcomes(stepped) if stepped else None, island.time, end
         for part, out in zip(parts, outcomes, strict=True):
             if out is None:
                 self._give_back(run, pair_events, part, island.time)
@@ -573,9 +592,9 @@ class SubsteppedIslands:
         )  # fmt: skip
         self.stepper.set_up(run, members, fixed, ahead, kept, fineness)
 
-    def begin_trajectories(self, run: Run, pair_events: PairEvents, island: Island) -> None:
+    def begin_trajectories(self, run: Run, pair_events: PairEvents, _island: Island) -> None:
         """Give the members the trajectories that the solver found."""
-        out, state, time = self._outcome, run.state, island.time
+        out, state, time = self._outcome, run.state, self._outcome_begin
         if out is None:
             return
         length = self._outcome_end - time
@@ -592,3 +611,8 @@ class SubsteppedIslands:
             out.members, (out.position, out.orientation, out.velocity), (run.world.steady_strength, stepper.inner, stepper.skin), length,
             self._stood, self.sleep_timer,
         )  # fmt: skip
+
+
+def _bare_island(time: float) -> Island:
+    """An island in which nothing touches."""
+    return island_without_contacts(time, np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))

@@ -399,8 +399,7 @@ class ContactStepper:
 
     def _general(self) -> General:
         """What general pairs need."""
-        shapes = Shapes(self.geometry, self.world.shape_of_body)
-        return General(self._smaller, shapes, self._taken_off, self._asked, self._buffers[0].contacts)
+        return General(self._smaller, self.world.shape_of_body, self._taken_off, self._asked, self._buffers[0].contacts)
 
     def _make_space(self, how: int, needed: int) -> None:
         """Make space for what had none."""

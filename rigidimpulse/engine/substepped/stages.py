@@ -98,7 +98,7 @@ class General(NamedTuple):
     """What general pairs need."""
 
     smaller: SmallerShapes
-    shapes: Shapes  # the smaller ones, of the bodies by index
+    of_body: np.ndarray  # (n,) shape of each body, by index
     taken_off: np.ndarray  # (n,) m, see `ask_general`
     asked: Asked
     contacts: Contacts
@@ -207,7 +207,7 @@ def _mark(island, memory, general, progress):
     """Leave out meshes that are too far apart."""
     asked, places, margins, waiting, left = general.asked, memory.places, memory.margins, progress[WAITING], np.int64(0)
     span = (np.int64(0), waiting)
-    mark_apart(general.smaller, general.shapes.of_body, island.bodies, asked, memory.table.pairs, places, span)
+    mark_apart(general.smaller, general.of_body, island.bodies, asked, memory.table.pairs, places, span)
     for k in range(waiting):
         if not asked.is_apart[k]:
             places[left], margins[left] = places[k], margins[k]
@@ -221,10 +221,9 @@ def _mark(island, memory, general, progress):
 @jit
 def _search(general, progress):
     """Find the contacts of general pairs."""
-    asked, count = general.asked, progress[WAITING]
-    found = contacts_of_pairs(
-        general.shapes, asked, asked.rotation, PairQuery(asked.a[:count], asked.b[:count], asked.shown[:count]), general.contacts, ALL
-    )
+    asked, count, shapes = general.asked, progress[WAITING], Shapes(general.smaller.geometry, general.of_body)
+    query = PairQuery(asked.a[:count], asked.b[:count], asked.shown[:count])
+    found = contacts_of_pairs(shapes, asked, asked.rotation, query, general.contacts, ALL)
     if found < 0:
         progress[NEEDED] = -found
         return MORE_CONTACTS
