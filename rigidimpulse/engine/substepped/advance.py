@@ -441,7 +441,7 @@ class SubsteppedIslands:
         assert island.substepped is not None
         if self._jointed.any():
             return False
-        return len(island.substepped) == np.count_nonzero(run.world.dynamic) == np.count_nonzero(pair_events.inside)
+        return len(island.substepped) == int(run.world.dynamic.sum()) == int(pair_events.inside.sum())
 
     def _contact_forces(self, run: Run, pair_events: PairEvents, island: Island) -> None:
         """Step an island from its time until its trajectories must begin again."""
