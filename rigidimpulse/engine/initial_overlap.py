@@ -143,9 +143,10 @@ class _Search:
             if (a, b) in self.demands or not self.ways_out.meets(a, b, self._beside(a, b)):
                 continue
             before, c = self._beside_as_given(a, b), self._beside(a, b)
-            if not self.ways_out.meets(a, b, before):
+            # At first they are where they were given.
+            if not (np.array_equal(before, c) or self.ways_out.meets(a, b, before)):
                 self.demands[a, b], changed = [self.ways_out.on_its_side(a, b, before, c)], True
-            elif self.ways_out.overlaps(a, b, c):
+            elif self.ways_out.is_deep(a, b, c):
                 self.demands[a, b], changed = [self.ways_out.least(a, b, c)], True
         return changed
 

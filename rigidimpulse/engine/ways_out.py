@@ -86,9 +86,13 @@ class WaysOut:
         return self._narrowphase.overlap(shape_a, (np.zeros(3), turn_a), shape_b, (c, turn_b))
 
     def overlaps(self, a: int, b: int, c: np.ndarray) -> bool:
-        """Whether b at c (3,) m beside a overlaps it: not if it is free when it is moved by DEPTH of its size along one of the axes."""
+        """Whether b at c (3,) m beside a overlaps it, and does not only touch it."""
+        return self.meets(a, b, c) and self.is_deep(a, b, c)
+
+    def is_deep(self, a: int, b: int, c: np.ndarray) -> bool:
+        """Whether b, which meets a, does so deeply: it is not free when it is moved by DEPTH of its size along one of the axes."""
         moved = DEPTH * self.size(a, b)
-        return self.meets(a, b, c) and all(self.meets(a, b, c + moved * step) for step in DIRECTIONS)
+        return all(self.meets(a, b, c + moved * step) for step in DIRECTIONS)
 
     def least(self, a: int, b: int, c: np.ndarray) -> Demand:
         """The least way out of an overlap of b, which is c (3,) m beside a."""
