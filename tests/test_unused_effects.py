@@ -69,7 +69,7 @@ EFFECTS = {
         ["dynamics.constraints.rolling_friction"],
     ),
     "sub-stepped islands": (
-        "ground", "settings = {'accuracy': ri.Accuracy(contact_solver='substepped')}", ["dynamics.solvers.tgs_soft.solver"]
+        "ground", "settings = {'accuracy': ri.Accuracy(contact_solver='substepped')}", ["engine.substepped.stages"]
     ),
     "contact forces": (
         "balls", 'scene.gravity = (0, 0, -1)\nscene.add(ri.Body("floor", ri.Shape.half_space(offset=-0.1), motion="static"))',

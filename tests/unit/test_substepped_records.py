@@ -11,10 +11,10 @@ import rigidimpulse as ri
 from rigidimpulse.collision.contact_records import MEMBER, in_play
 from rigidimpulse.core.kernels import Kernel
 from rigidimpulse.dynamics.solvers.tgs_soft.records import LINES, POINTS
-from rigidimpulse.dynamics.solvers.tgs_soft.solver import advance
 from rigidimpulse.engine.simulate import complete, frame_times, prepare
 from rigidimpulse.engine.substepped.advance import SubsteppedIslands
 from rigidimpulse.engine.substepped.sharing import Sharing
+from rigidimpulse.engine.substepped.stages import COLOURS, COLOURS_BEGUN, work_on
 
 
 def pile(number: int) -> ri.Scene:
@@ -37,11 +37,11 @@ def test_every_contact_is_in_one_element_with_the_motion_since_it_was_put_there(
     made, steps = {}, {"whole": 0, "steady": 0}
 
     def checked(kernel: Kernel, calls: Sequence[tuple]) -> list[Any]:
-        if kernel is not advance:
+        if kernel is not work_on:
             return kernel.together(calls)
-        simd, solve, *_ = calls[0]
-        bodies, pairs, _, batches, _, edges, steady = solve
-        rows = batches.row[: POINTS * edges[-1] * simd.width]
+        simd, island, memory, _, progress, *_ = calls[0]
+        bodies, pairs, steady = island.bodies, memory.table.pairs, progress[COLOURS_BEGUN]
+        rows = memory.batches.row[: POINTS * memory.begins[progress[COLOURS]] * simd.width]
         seen = np.sort(rows[rows > 0] // LINES)
         listed = [
             range(start, start + count)
@@ -58,6 +58,6 @@ def test_every_contact_is_in_one_element_with_the_motion_since_it_was_put_there(
         return kernel.together(calls)
 
     run = prepare(pile(100), frame_times(1.2, 60.0))
-    run.substepped = SubsteppedIslands(run.world, Sharing(together=checked))
+    run.substepped = SubsteppedIslands(run.world, Sharing(most_cores=2, batches=-1, together=checked))
     assert complete(run, 1.2).status.ok
     assert min(steps.values()) > 50
