@@ -17,6 +17,7 @@ import os
 import re
 import secrets
 import shutil
+import site
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -167,8 +168,18 @@ def is_kept() -> bool:
 
 
 def variables_to_share_kernels() -> dict[str, str]:
-    """Return environment variables for a process that is to put its kernels where this one finds them."""
-    return dict(os.environ) if is_kept() else {**os.environ, "NUMBA_CACHE_DIR": str(_root_of_this_process().parent)}
+    """Return environment variables for a process that is to put its kernels where this one finds them.
+
+    Started with `python -P`, it imports this very package, whatever folder of its name lies in the present one: in a clone the installed
+    package would wait for kernels that were compiled for the clone.
+    """
+    variables, root = dict(os.environ), str(Path(__file__).resolve().parents[2])
+    if not is_kept():
+        variables["NUMBA_CACHE_DIR"] = str(_root_of_this_process().parent)
+    # Where Python finds it anyway: before the standard library these packages might hide parts of that.
+    if root not in site.getsitepackages():
+        variables["PYTHONPATH"] = os.pathsep.join([root, *filter(None, [variables.get("PYTHONPATH")])])
+    return variables
 
 
 def _root_of_this_process() -> Path:

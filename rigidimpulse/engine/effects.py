@@ -247,9 +247,9 @@ def substep_contacts(run: Run, pair_events: PairEvents, island: Island) -> None:
     run.substepped.contact_forces(run, pair_events, island)
 
 
-def begin_substepped_trajectories(run: Run, pair_events: PairEvents, island: Island) -> None:
+def begin_substepped_trajectories(run: Run, pair_events: PairEvents, _island: Island) -> None:
     """Trajectories of its members to where the solver found them, and of those that left it."""
-    run.substepped.begin_trajectories(run, pair_events, island)
+    run.substepped.begin_trajectories(run, pair_events)
 
 
 @dataclass(frozen=True)

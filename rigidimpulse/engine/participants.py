@@ -282,8 +282,8 @@ class Substepping(Protocol):
         """Step an island from its time to the end of the step."""
         ...
 
-    def begin_trajectories(self, run: Any, pair_events: Any, island: Island, /) -> None:
-        """Trajectories of its members to where the solver found them."""
+    def begin_trajectories(self, run: Any, pair_events: Any, /) -> None:
+        """Trajectories of the members that were stepped last, to where the solver found them."""
         ...
 
 

@@ -24,9 +24,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
 
-import numpy as np
-
-from rigidimpulse.collision.manifold.shrunk_shapes import convex_polyhedra, several_polyhedra
 from rigidimpulse.core.claim import claim
 from rigidimpulse.core.kernel_cache import is_kept, note_beside, source_digest, variables_to_share_kernels
 from rigidimpulse.core.kernels import Kernel, number_of_cores
@@ -132,23 +129,14 @@ def kernels_to_compile(
 
     is_ready: whether a kernel need not be compiled.
     """
-    joints, other_shapes = bool(world.joints_of_scene), with_substepped and has_other_shapes(world)
+    joints, general = bool(world.joints_of_scene), with_substepped and world.has_general_pairs
     needed = {
         CONTACTS: world.can_collide, EVENTS: with_events, SUBSTEPPED: with_substepped, JOINTS: joints,
-        POLYHEDRA: with_substepped and not other_shapes and (world.can_collide or joints), ANY_SHAPES: with_substepped and other_shapes,
+        POLYHEDRA: with_substepped and not general and (world.can_collide or joints), ANY_SHAPES: general,
         SHARED: with_substepped and world.num_bodies > MANY_BODIES and number_of_cores() > 1,
         STEPPED_JOINTS: with_substepped and joints, UNDER_FORCES: world.can_collide and bool(world.force_tables),
     }  # fmt: skip
     return [kind for kind in LAST if needed[kind] and not is_ready(_last_kernel(kind))]
-
-
-def has_other_shapes(world: World) -> bool:
-    """Whether a body that may collide is no half space nor made of convex polyhedra, for whose pairs sub-stepped islands have kernels."""
-    if not world.can_collide:
-        return False
-    geometry = world.geometry
-    polyhedra = convex_polyhedra(geometry, world.convex_depths) | several_polyhedra(geometry)
-    return bool(np.any(~world.half_space & ~polyhedra[world.shape_of_body]))
 
 
 def _last_kernel(kind: str) -> Any:
@@ -182,7 +170,7 @@ def compile_loop_in_background() -> None:
 def start_process(parts: Sequence[KernelPart], errors: IO[bytes] | None = None) -> subprocess.Popen:
     """Start a process that compiles those of some parts that no other does; what it says of errors goes to a file, or nowhere."""
     quiet = subprocess.DEVNULL
-    command = [sys.executable, "-m", PARTS_MODULE, *(word for part in parts for word in (part.kind, str(part.number)))]
+    command = [sys.executable, "-P", "-m", PARTS_MODULE, *(word for part in parts for word in (part.kind, str(part.number)))]
     variables = variables_to_share_kernels()
     return subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet if errors is None else errors, env=variables)
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.geometry import CompiledShape, Geometry, Shapes
-from rigidimpulse.collision.manifold.shrunk_shapes import convex_depths
+from rigidimpulse.collision.manifold.shrunk_shapes import convex_depths, convex_polyhedra, several_polyhedra
 from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.scene.frames import own_pose
 from rigidimpulse.scene.joint import Joint
@@ -116,6 +116,12 @@ class World:
     def convex_depths(self) -> np.ndarray:
         """See `collision.manifold.shrunk_shapes.convex_depths`."""
         return convex_depths(self.geometry)
+
+    @cached_property
+    def has_general_pairs(self) -> bool:
+        """Whether a body that may collide is no half space nor made of convex polyhedra, see `collision.manifold.dispatch.GENERAL`."""
+        polyhedra = convex_polyhedra(self.geometry, self.convex_depths) | several_polyhedra(self.geometry)
+        return self.can_collide and bool(np.any(~self.half_space & ~polyhedra[self.shape_of_body]))
 
     @cached_property
     def compiled_shapes(self) -> Shapes:

@@ -73,6 +73,17 @@ def test_parts_that_lie_in_the_cache_are_loaded_and_noted():
     assert part.note().exists() and part not in missing_parts()
 
 
+def test_kernels_are_compiled_for_this_package_whatever_lies_in_the_present_folder(tmp_path, monkeypatch):
+    """In a clone whose package is installed besides, processes compiled those of the clone, and none of 15 parts were there after it."""
+    (tmp_path / "rigidimpulse").mkdir()
+    (tmp_path / "rigidimpulse" / "__init__.py").write_text("raise ImportError", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    part = KernelPart("impacts of balls")
+    part.note().unlink(missing_ok=True)
+    assert compile_parts([part], 1, lambda done: None) == []
+    assert part.note().exists()
+
+
 HOLDS = """
 import sys, time
 from rigidimpulse.engine.warm_up import KernelPart

@@ -429,7 +429,7 @@ class SubsteppedIslands:
         self._contact_forces(run, pair_events, island)
         # Where all bodies are stepped, nothing can happen before the next trajectories begin: the loop is not asked.
         while self._outcome is not None and self._outcome_end < pair_events.end and self._has_all(run, pair_events, island):
-            self.begin_trajectories(run, pair_events, island)
+            self.begin_trajectories(run, pair_events)
             members = self._due(pair_events, self._outcome_end)
             pair_events.wake[members] = np.inf
             island = _bare_island(self._outcome_end)
@@ -592,7 +592,7 @@ class SubsteppedIslands:
         )  # fmt: skip
         self.stepper.set_up(run, members, fixed, ahead, kept, fineness)
 
-    def begin_trajectories(self, run: Run, pair_events: PairEvents, _island: Island) -> None:
+    def begin_trajectories(self, run: Run, pair_events: PairEvents) -> None:
         """Give the members the trajectories that the solver found."""
         out, state, time = self._outcome, run.state, self._outcome_begin
         if out is None:

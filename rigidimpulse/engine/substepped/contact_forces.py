@@ -13,7 +13,6 @@ from rigidimpulse.collision.contact_buffer import ContactBuffer, Question, find_
 from rigidimpulse.collision.contact_cache import (
     TOO_FEW_PLACES,
     Convex,
-    Limits,
     Share,
     classify,
     find_contacts,
@@ -61,7 +60,6 @@ from rigidimpulse.engine.substepped.stages import (
     END,
     FIND,
     FOUND,
-    IS_AGAIN,
     KEEP,
     LEAST_SUB_STEPS_BETWEEN,
     LEFT,
@@ -90,10 +88,10 @@ from rigidimpulse.engine.substepped.stages import (
     Step,
     go_on,
     go_on_with_polyhedra,
+    limits_of,
     pieces_of,
     work_on,
 )
-from rigidimpulse.engine.warm_up import has_other_shapes
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.evaluate import refresh_pose
 
@@ -214,7 +212,7 @@ class ContactStepper:
         inset, depth, back = inset_surfaces(world.shapes, world.geometry, convex, dynamic_shapes)
         self.geometry, factor = shrunk_geometry(inset, world.convex_depths, dynamic_shapes)
         self.shapes = make_polyhedra(world.geometry, convex, several=several_polyhedra(world.geometry))
-        self._has_general = has_other_shapes(world)
+        self._has_general = world.has_general_pairs
         solid_shapes, drum, inset_of_solids = solids(world.shapes, world.geometry, convex, self.shapes)
         convex |= drum
         kinds = world.shape_of_body[self.order]
@@ -439,8 +437,7 @@ class ContactStepper:
 
     def _find_contacts(self) -> None:
         """Find the contacts of pairs that are not general, on several cores."""
-        table, step, progress, shares = self.table, self._step, self._progress, self._shares
-        limits = Limits(step.ahead, step.same, step.kept if progress[IS_AGAIN] else step.first_kept, step.fall)
+        table, progress, shares, limits = self.table, self._progress, self._shares, limits_of.py_func(self._step, self._progress)
         while True:
             outcome = self._sharing.call(find_contacts, [
                 (

@@ -174,12 +174,17 @@ def _look_again(width, island, memory, step, progress):
 
 
 @jit
+def limits_of(step, progress):
+    """How far pairs may move with the contacts they have."""
+    return Limits(step.ahead, step.same, step.kept if progress[IS_AGAIN] else step.first_kept, step.fall)
+
+
+@jit
 def _find(island, memory, step, progress):
     """Find the contacts of pairs that are not general."""
     share = Share(np.int64(0), np.int64(1), memory.places, memory.margins)
-    limits = Limits(step.ahead, step.same, step.kept if progress[IS_AGAIN] else step.first_kept, step.fall)
     looked_at, waiting = find_contacts(
-        island.convex, island.bodies, memory.table, share, limits, island.coefficients, memory.workspace
+        island.convex, island.bodies, memory.table, share, limits_of(step, progress), island.coefficients, memory.workspace
     )
     if waiting < 0:
         progress[NEEDED] = memory.workspace.parts.real.shape[0]
