@@ -170,8 +170,7 @@ def is_kept() -> bool:
 def variables_to_share_kernels() -> dict[str, str]:
     """Return environment variables for a process that is to put its kernels where this one finds them.
 
-    Started with `python -P`, it imports this very package, whatever folder of its name lies in the present one: in a clone the installed
-    package would wait for kernels that were compiled for the clone.
+    Started with `python -P`, it imports this very package, and no folder of its name in the present one, such as that of a clone.
     """
     variables, root = dict(os.environ), str(Path(__file__).resolve().parents[2])
     if not is_kept():
