@@ -194,6 +194,12 @@ class PairEvents:
         moves = (self.run.state.trajectory.mode != FIXED) | self.run.soft_bodies.pressed
         return np.flatnonzero(moves & ~self.inside)
 
+    def may_meet(self, bodies: np.ndarray) -> bool:
+        """Whether some pair of these bodies is swept."""
+        mark, pairs = np.zeros(len(self.wake), bool), self.pairs
+        mark[bodies] = True
+        return bool(np.any(mark[pairs["a"]] | mark[pairs["b"]]))
+
     def bodies_at(self, time: float) -> np.ndarray:
         """Movable bodies that come to contact, and bodies that are called, at `time`."""
         mark = np.empty(len(self.wake), bool)

@@ -242,7 +242,7 @@ def _step_island(run: Run, sharing: Sharing | None = None) -> None:
     stepper = ContactStepper(run.world, run.world.dynamic, COARSE, sharing)
     stepper.set_up(run, np.array([1]), np.array([0]), STEP)
     stepper.move_apart(run, np.array([1]), 0.0)
-    stepper.step(run)
+    stepper.step(run, 0.0, STEP)
 
 
 def _share_island(run: Run) -> None:

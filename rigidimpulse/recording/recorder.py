@@ -124,6 +124,10 @@ class Recorder:
         """Write frame 0, the state as given."""
         self._write(trajectory, self._everyone, 1)
 
+    def has_frames(self, begin: float, end: float) -> bool:
+        """Whether frames fall between these times [s], both excluded."""
+        return bool(np.searchsorted(self.times, end, side="left") > np.searchsorted(self.times, begin, side="right"))
+
     def flush(self, trajectory: Trajectories, i: int, time: float, correction: np.ndarray) -> None:
         """Write the frames of body i before `time` [s], with what it was corrected by (6,) then; see `flush_frames`."""
         due = self.written[i]
@@ -133,6 +137,13 @@ class Recorder:
     def flush_all(self, trajectory: Trajectories, bodies: np.ndarray, time: float) -> None:
         """Write the frames of all these bodies before `time`, as `flush` does."""
         self._write(trajectory, bodies, int(np.searchsorted(self.times, time, side="left")))
+
+    def put(self, bodies: np.ndarray, first: int, frames: Frames) -> None:
+        """Write the next frames of these bodies (k,), from frame `first` on: those of a recorder of k bodies."""
+        last = first + len(frames.times)
+        self.position[first:last, bodies], self.orientation[first:last, bodies] = frames.position, frames.orientation
+        self.velocity[first:last, bodies], self.angular_velocity[first:last, bodies] = frames.velocity, frames.angular_velocity
+        self.written[bodies] = last
 
     def keep(self, count: int) -> None:
         """Leave the first `count` frames only."""

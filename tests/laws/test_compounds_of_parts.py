@@ -172,6 +172,6 @@ def test_any_number_of_shares_gives_the_same_bits() -> None:
         run = Run(world, Plan(world, []), Recorder(np.zeros(1), 2), EventLog())
         for _ in range(3):
             stepper.set_up(run, np.arange(40), np.zeros(0, np.int64), 1.0 / 60.0)
-            out = stepper.step(run)
+            out = stepper.step(run, 0.0, 1.0 / 60.0)
         outcomes.append(np.concatenate([out.position.ravel(), out.velocity.ravel()]))
     assert outcomes[0].tobytes() == outcomes[1].tobytes()

@@ -52,6 +52,7 @@ from rigidimpulse.engine.substepped.hand_over import HandOver
 from rigidimpulse.engine.substepped.jointed import JointedStepper
 from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
+from rigidimpulse.engine.substepped.waypoints import Way, part_of, way_of, write_frames
 from rigidimpulse.engine.warm_up import prepare_kernels
 from rigidimpulse.model.island import Island, island_without_contacts
 from rigidimpulse.model.world import World
@@ -80,6 +81,7 @@ class _Began(NamedTuple):
     raised: float  # J that bodies gain until then by rising out of each other, and cannot pay
     given: float  # J that drives and moving supports give by joints and the contacts beside them
     joints: np.ndarray  # of the members
+    way: Way | None  # if frames fall into it
 
 
 class SubsteppedIslands:
@@ -343,12 +345,16 @@ class SubsteppedIslands:
         if not len(members):
             return
         state, world = run.state, run.world
+        labels = np.unique(self.label[members]).tolist()
+        for label in labels:
+            if label in self._began and (way := self._began[label].way) is not None:
+                write_frames(run.recorder, way, time)
         run.recorder.flush_all(state.trajectory, members, time)
         end_trajectories(
             state.trajectory, members, time, world.steady_acceleration, state.now, state.rotation, run.acceleration,
             run.angular_acceleration,
         )  # fmt: skip
-        for label in np.unique(self.label[members]).tolist():
+        for label in labels:
             self._account(run, label, time)
 
     def _account(self, run: Run, label: int, time: float) -> None:
@@ -517,19 +523,21 @@ class SubsteppedIslands:
                 self.stepper.move_apart(run, fresh, time)
                 change = mechanical_energy(run.state.now, run.world.constants, members) - before
                 run.log.account(time, "position correction", change)
-            out = self.stepper.step(run)
+            out = self.stepper.step(run, time, end)
         if self.hand_over.cheapest is not None:
             self.hand_over.cheapest.note(members, self.stepper.parts)
         if out is None:
             return None
         amounts = np.zeros((3, run.world.num_bodies))
         amounts[:, out.members] = out.taken, out.raised, out.given
+        way = way_of(out, run.state.now, time, end)
         for label in np.unique(self.label[members]).tolist():
             mine = members[self.label[members] == label]
             self._ends[label] = end
             energy = mechanical_energy(run.state.now, run.world.constants, mine)
             taken, raised, given = amounts[:, mine].sum(axis=1).tolist()
-            self._began[label] = _Began(time, end, mine, energy, taken, raised, given, which)
+            part = None if way is None else part_of(way, mine)
+            self._began[label] = _Began(time, end, mine, energy, taken, raised, given, which, part)
         return out
 
     def _step_jointed(self, run: Run, members: np.ndarray, span: tuple[float, float], kept: float) -> Outcome | None:
@@ -553,20 +561,21 @@ class SubsteppedIslands:
             run.state.under_contact[i] = False
 
     def _end_of(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray, joints: np.ndarray) -> float:
-        """When trajectories of members end: before the step does where bodies are tiny, spin fast or stray from lines, or joints let go."""
-        alone = len(joints) > 0 and len(self._solved_together(run, members)) == len(np.unique(self.label[members]))
-        step = run.world.accuracy.step if alone else self.stepper.step_length
-        end = self._end_of_trajectories(run, pair_events, time, members, step)
-        return min(end, run.joints.next_release(joints, time)) if len(joints) else end
+        """When trajectories of members end: before the step does where bodies are tiny or spin fast, or joints let go.
 
-    def _end_of_trajectories(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray, step: float) -> float:
-        """The same without what joints ask for; step: that is stepped at once at most, s."""
-        stepper = self.stepper
-        stray = most_stray(run.state.now, members, stepper.pressed | self._finer, stepper.reach, stepper.skin, stepper.straight)
+        So they do where others may meet members in the step: what meets a body that turns, in the middle of its straight way, meets it
+        elsewhere than it is.
+        """
+        stepper, step, straight = self.stepper, run.world.accuracy.step, np.inf
+        if pair_events.may_meet(members):
+            alone = len(joints) > 0 and len(self._solved_together(run, members)) == len(np.unique(self.label[members]))
+            step, straight = step if alone else stepper.step_length, stepper.straight
+        stray = most_stray(run.state.now, members, stepper.pressed | self._finer, stepper.reach, stepper.skin, straight)
         spans = max(math.ceil(step / stepper.span(members, step) - 1e-9), 1)
         pieces = max(min(math.ceil(stray * step), MOST_PIECES * spans), spans)
         left = max(math.ceil((pair_events.end - time) * pieces / step - 1e-6), 1)
-        return pair_events.end if left == 1 else time + (pair_events.end - time) / left
+        end = pair_events.end if left == 1 else time + (pair_events.end - time) / left
+        return min(end, run.joints.next_release(joints, time)) if len(joints) else end
 
     def _leaves(self, run: Run, island: Island) -> np.ndarray:
         """Which members (k,) bool leave all that they touch at a speed worth the name."""

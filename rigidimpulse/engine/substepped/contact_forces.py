@@ -73,6 +73,7 @@ from rigidimpulse.engine.substepped.stages import (
     MORE_PATCHES,
     MORE_PLACES,
     MORE_POINTS,
+    MORE_WAYPOINTS,
     NEEDED,
     NEEDS_GENERAL,
     NEXT,
@@ -80,12 +81,15 @@ from rigidimpulse.engine.substepped.stages import (
     SHARE,
     SOME,
     STAGE,
+    STATE,
     STORE,
     WAITING,
+    WAYPOINTS,
     General,
     Island,
     Memory,
     Step,
+    Waypoints,
     go_on,
     go_on_with_polyhedra,
     limits_of,
@@ -143,6 +147,7 @@ class Outcome:
 
     taken, raised: (k,) J that the balance of energy took off their speeds, and that they gained and could not pay.
     given: (k,) J, work of drives and moving supports in islands with joints.
+    waypoints: of these bodies, if frames fall into the step.
     """
 
     members: np.ndarray
@@ -152,13 +157,15 @@ class Outcome:
     taken: np.ndarray
     raised: np.ndarray
     given: np.ndarray
+    waypoints: Waypoints | None
 
 
 def joined_outcomes(outcomes: list[Outcome]) -> Outcome:
-    """The outcomes of several sets of bodies as one; there is at least one."""
+    """The outcomes of several sets of bodies as one, without waypoints; there is at least one."""
     if len(outcomes) == 1:
         return outcomes[0]
-    return Outcome(*(np.concatenate([getattr(out, column.name) for out in outcomes]) for column in fields(Outcome)))
+    columns = [column.name for column in fields(Outcome) if column.name != "waypoints"]
+    return Outcome(*(np.concatenate([getattr(out, name) for out in outcomes]) for name in columns), waypoints=None)
 
 
 @dataclass(frozen=True)
@@ -238,7 +245,7 @@ class ContactStepper:
         none = Batches(np.zeros(0, np.float32), np.zeros(0), *np.zeros((4, 0), np.int32))
         self._batches = more_batches(none, patches // self.simd.width + 1, self.simd.width)
         self._begins = np.zeros(256, np.int64)
-        self._work_queue = empty_work_queue()
+        self._work_queue, self._waypoints = empty_work_queue(), Waypoints(np.zeros(0), np.zeros((0, n, STATE)))
         self._places_of_bodies = aligned(n + 1)
         self._part = np.zeros(n, np.int64)
         self.step_length = world.accuracy.step * parts.step
@@ -257,7 +264,7 @@ class ContactStepper:
         )
         self._step = Step(
             h=0.0, ahead=0.0, same=SAME * self.motion, first_kept=0.0, kept=self.kept, fall=0.0, strength=0.0, soft=np.zeros((2, 3)),
-            sub_steps=1, parts=1, law=LAWS[world.accuracy.restitution], all_quick=self._all_quick, is_special=is_special,
+            sub_steps=1, parts=1, law=LAWS[world.accuracy.restitution], all_quick=self._all_quick, is_special=is_special, has_frames=False,
             most_cores=self._shares, many_pairs=self._sharing.pairs, many_general=self._sharing.general_pairs,
             many_batches=self._sharing.batches,
         )  # fmt: skip
@@ -392,7 +399,7 @@ class ContactStepper:
         table = self.table
         return Memory(
             table.arrays, table.lines, self._places, self._margins, self._workspaces[0], self._patches, self._lists, self._target,
-            self._batches, self._begins, self._places_of_bodies, self._work_queue,
+            self._batches, self._begins, self._places_of_bodies, self._work_queue, self._waypoints,
         )  # fmt: skip
 
     def _general(self) -> General:
@@ -417,6 +424,9 @@ class ContactStepper:
             self._lists, self._target = _special_lists(needed)
         elif how == MORE_COLOURS:
             self._begins = np.concatenate([self._begins, np.zeros(needed, np.int64)])
+        elif how == MORE_WAYPOINTS:
+            time, state = self._waypoints
+            self._waypoints = Waypoints(np.resize(time, needed), np.resize(state, (needed, *state.shape[1:])))
         else:
             self._batches = more_batches(self._batches, needed, self.simd.width)
 
@@ -544,9 +554,9 @@ class ContactStepper:
         now.velocity[self.members], now.angular_velocity[self.members] = velocity[:, :3], velocity[:, 3:6]
         refresh_pose(fresh, now, run.state.rotation, self.world.inertia)
 
-    def step(self, run: Run) -> Outcome:
-        """Step what `set_up` put before the kernels."""
-        self.begin_step()
+    def step(self, run: Run, begin: float, end: float) -> Outcome:
+        """Step what `set_up` put before the kernels from `begin` to `end`, s."""
+        self.begin_step(run, begin, end)
         self._go_on(run, END)
         note_pressed(self.bodies, self.order, self.pressed)
         out = self.end_step()
@@ -564,8 +574,9 @@ class ContactStepper:
             progress[STAGE] = NEXT
             self._go_on(run, LIST)
 
-    def begin_step(self) -> None:
-        """Remember the energies of the members."""
+    def begin_step(self, run: Run, begin: float, end: float) -> None:
+        """Remember the energies of the members, and whether frames fall between `begin` and `end`, s."""
+        self._step = self._step._replace(has_frames=run.recorder.has_frames(begin, end))
         begin_balance(self.balance, self.bodies, self._weights)
 
     def end_step(self) -> Outcome:
@@ -575,8 +586,11 @@ class ContactStepper:
         given = balance.given[at]
         end_balance(balance, bodies, self._weights)
         velocity = bodies.velocity.reshape(-1, ROW)[at, :6]
+        waypoints, count = None, self._progress[WAYPOINTS]
+        if self._step.has_frames:
+            waypoints = Waypoints(self._waypoints.time[:count].copy(), self._waypoints.state[:count, at])
         return Outcome(
-            members, bodies.position[at], bodies.orientation[at], velocity, balance.taken[at], balance.raised[at], given
+            members, bodies.position[at], bodies.orientation[at], velocity, balance.taken[at], balance.raised[at], given, waypoints
         )  # fmt: skip
 
 

@@ -74,7 +74,7 @@ class JointedStepper:
         stepper, which = self._stepper, run.joints.at(self._stepper.members)
         island = self._island(run, which)
         moment, given = np.zeros((len(self._joints.body_a), 3)), np.zeros((len(stepper.table.pairs.first), 10))
-        stepper.begin_step()
+        stepper.begin_step(run, time, end)
         kept = Kept(self._stiffening, moment, self._driven, np.zeros(1), given)
         worst = self._sub_steps(run, island, kept)
         if not worst <= self._open:

@@ -61,20 +61,24 @@ FIND, ASK, MARK, SEARCH, STORE, PLAN, LIST, SOLVE, KEEP, NEXT, LOOK, END = range
 """Stages."""
 GOES_ON, AT_STAGE, SHARE, NEEDS_GENERAL = map(np.int64, range(4))
 """Why the stages stopped: at the one that was asked for, before one that several cores share, before the first general pair."""
-MORE_PLACES, MORE_POINTS, MORE_ASKED, MORE_CONTACTS, MORE_PATCHES, MORE_COLOURS, MORE_BATCHES = map(np.int64, range(4, 11))
+(
+    MORE_PLACES, MORE_POINTS, MORE_ASKED, MORE_CONTACTS, MORE_PATCHES, MORE_COLOURS, MORE_BATCHES, MORE_WAYPOINTS,
+) = map(np.int64, range(4, 12))  # fmt: skip
 """The same, for space, of which progress[NEEDED] is wanted."""
 (
     STAGE, IS_AGAIN, PART, LENGTH, LEFT, SOME, LOOKED_AT, WAITING, FOUND, BEGUN, COLOURS_BEGUN, BATCHES_BEGUN, COUNT, COLOURS, BATCHES,
-    BALLS, REBOUNDS, SUPPORTS, NEEDED, COLUMNS,
-) = range(20)  # fmt: skip
+    BALLS, REBOUNDS, SUPPORTS, NEEDED, MADE, WAYPOINTS, COLUMNS,
+) = range(22)  # fmt: skip
 """Columns of progress: stage; 1 after the first look; part of the step, its sub-steps, those left, and those until the next look; pairs
 that were looked at, general ones that wait, their contacts; patches, colours and batches that were made at earlier looks, and all of them;
-special patches; what is needed."""
+special patches; what is needed; sub-steps that were made; waypoints."""
 COARSEST = 0.3
 """Inner radii by which bodies with inset surfaces may pass each other from look to look: sub-steps are made shorter for it."""
 TURNED = 2.0 * TILT
 """Angle by which meshes may turn against each other from look to look, rad: of their corners those that come down by less are found. A die
 that turned by twice that over an edge, in a cup, was 3.5 mm inside of it."""
+STATE = 13
+"""Numbers of a body in `Waypoints`."""
 LEAST_SUB_STEPS_BETWEEN = 2
 """Sub-steps from look to look."""
 QUICK = 0.4
@@ -104,6 +108,13 @@ class General(NamedTuple):
     contacts: Contacts
 
 
+class Waypoints(NamedTuple):
+    """Where n bodies are at the looks in the middle of a step, by rank."""
+
+    time: np.ndarray  # (w,) s, from the start of the step
+    state: np.ndarray  # (w, n, 13) position, orientation, velocity, angular velocity
+
+
 class Memory(NamedTuple):
     """Contacts, their records, and scratch memory; it may grow between two stages."""
 
@@ -119,6 +130,7 @@ class Memory(NamedTuple):
     begins: np.ndarray  # (c+1,) where the batches of colours begin
     places_of_bodies: np.ndarray  # (8 (n+1),) of `place_bodies`
     work_queue: np.ndarray  # of several cores that solve
+    waypoints: Waypoints
 
 
 class Step(NamedTuple):
@@ -137,6 +149,7 @@ class Step(NamedTuple):
     law: int  # of restitution
     all_quick: bool  # all contacts are found again in the middle of the step
     is_special: bool  # whether there may be special patches
+    has_frames: bool  # whether frames fall into the step: the waypoints are kept
     most_cores: int
     many_pairs: int  # beyond which several cores look at them
     many_general: int  # the same of general pairs
@@ -338,8 +351,30 @@ def _keep(simd, island, memory, progress):
 
 
 @jit
-def _next(step, progress):
+def _keep_waypoint(bodies, waypoints, time, number):
+    """Write where bodies are at `time` s from the start of the step as waypoint `number`."""
+    waypoints.time[number] = time
+    for i in range(waypoints.state.shape[1]):
+        row = waypoints.state[number, i]
+        for k in range(3):
+            row[k] = bodies.position[i, k]
+        for k in range(4):
+            row[3 + k] = bodies.orientation[i, k]
+        for k in range(6):
+            row[7 + k] = bodies.velocity[8 * i + k]
+
+
+@jit
+def _next(island, memory, step, progress):
     """Sub-steps have been made: look again, unless that was the end of the step."""
+    number = progress[WAYPOINTS]
+    if step.has_frames and number == memory.waypoints.time.shape[0]:
+        progress[NEEDED] = 2 * number + 1
+        return MORE_WAYPOINTS
+    progress[MADE] += progress[SOME]
+    if step.has_frames:
+        _keep_waypoint(island.bodies, memory.waypoints, step.h * progress[MADE], number)
+        progress[WAYPOINTS] += 1
     progress[LEFT] -= progress[SOME]
     progress[STAGE] = LOOK
     if progress[LEFT] == 0:
@@ -402,7 +437,7 @@ def go_on(simd, island, memory, general, step, progress, last):
         elif stage == KEEP:
             how = _keep(simd, island, memory, progress)
         elif stage == NEXT:
-            how = _next(step, progress)
+            how = _next(island, memory, step, progress)
         elif general is None:
             how = NEEDS_GENERAL
         else:
