@@ -566,10 +566,10 @@ class SubsteppedIslands:
         So they do where others may meet members in the step: what meets a body that turns, in the middle of its straight way, meets it
         elsewhere than it is.
         """
-        stepper, step, straight = self.stepper, run.world.accuracy.step, np.inf
-        if pair_events.may_meet(members):
-            alone = len(joints) > 0 and len(self._solved_together(run, members)) == len(np.unique(self.label[members]))
-            step, straight = step if alone else stepper.step_length, stepper.straight
+        stepper, meets = self.stepper, pair_events.may_meet(members)
+        step, straight = (stepper.step_length, stepper.straight) if meets else (stepper.alone_length, np.inf)
+        if len(joints) and len(self._solved_together(run, members)) == len(np.unique(self.label[members])):
+            step = run.world.accuracy.step
         stray = most_stray(run.state.now, members, stepper.pressed | self._finer, stepper.reach, stepper.skin, straight)
         spans = max(math.ceil(step / stepper.span(members, step) - 1e-9), 1)
         pieces = max(min(math.ceil(stray * step), MOST_PIECES * spans), spans)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -81,15 +81,12 @@ from rigidimpulse.engine.substepped.stages import (
     SHARE,
     SOME,
     STAGE,
-    STATE,
     STORE,
     WAITING,
-    WAYPOINTS,
     General,
     Island,
     Memory,
     Step,
-    Waypoints,
     go_on,
     go_on_with_polyhedra,
     limits_of,
@@ -98,6 +95,7 @@ from rigidimpulse.engine.substepped.stages import (
 )
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.evaluate import refresh_pose
+from rigidimpulse.motion.waypoints import Waypoints, grown_waypoints, make_waypoints, waypoints_of
 
 COLUMN = 20.0
 """Bodies whose weight may press the skin in by PRESSED."""
@@ -126,19 +124,21 @@ class Parts(NamedTuple):
     """Parts of the settings `step` and `substep_motion` that bodies without joints are stepped with."""
 
     step: float  # of `step`, what is stepped at once at most
+    alone: float  # the same where nothing else may meet what is stepped
     sub_step: float  # of the longest sub-step
     motion: float  # of `substep_motion`, until touching bodies are looked at again
     straight: float  # of `substep_motion`, skins by which trajectories may stray from the ways of turning bodies
 
 
-COARSE = Parts(1.0, 1.0, 1.0, 10.0)
+COARSE = Parts(1.0, 1.0, 1.0, 1.0, 10.0)
 """For crowds."""
-FINE = Parts(1.0 / 2.0, 1.0 / 8.0, 1.0 / 2.0, 5.0)
+FINE = Parts(1.0 / 2.0, 1.0 / 2.0, 1.0 / 8.0, 1.0 / 2.0, 5.0)
 """For scenes that are no crowd (`regime.CROWD`): no body is deeper in another than the skin in thirty scenes of 12 to 60 bodies, where in
-nine of them one was, up to 13 skins (`tests/bench/both_regimes.py`)."""
-FINEST = Parts(1.0 / 8.0, 1.0 / 32.0, 1.0 / 2.0, 1.0)
+nine of them one was, up to 13 skins (`tests/bench/both_regimes.py`). A whole step at once is too long: where a heavy body hits a light one
+that stands, sub-steps become shorter when the next ones begin (see UNLIKE)."""
+FINEST = Parts(1.0 / 8.0, 1.0, 1.0 / 32.0, 1.0 / 2.0, 1.0)
 """For islands of scenes of few bodies that stand in for exact ones: a row of dominoes keeps its energy to 1e-7 of it. Stepped twice as far
-at once, as finely, it gains up to 1e-2 of a domino's: what hits them in the middle meets straight ways."""
+at once, as finely, it gains up to 1e-2 of a domino's from what hits it in the middle, where its ways are straight."""
 
 
 @dataclass
@@ -174,11 +174,13 @@ class Fineness:
 
     Attributes:
         sub_step: s, the longest. motion: inner radii that touching bodies move until they are looked at again.
+        motion_of_new: the same of what comes to contact in the middle of the step; inf: no more often than others.
 
     """
 
     sub_step: float
     motion: float
+    motion_of_new: float = np.inf
 
 
 class ContactStepper:
@@ -187,7 +189,8 @@ class ContactStepper:
     Attributes:
         order: (n,) bodies by their places at the start of the run; rank: (n,) place of each in it.
         inner: (n,) m, distance from the centre of mass to the nearest face; inf for what cannot be moved. skin: (n,) m.
-        step_length: s, that is stepped at once at most; motion: inner radii, see `Accuracy.substep_motion`.
+        step_length, alone_length: s, that is stepped at once at most, and where nothing else may meet what is stepped.
+        motion: inner radii, see `Accuracy.substep_motion`.
         kept: inner radii that a pair may come past each other with the contacts it has, in the middle of a step.
         straight: skins by which trajectories may stray from the ways of turning bodies.
         bodies: by rank. table: pairs and contact points. balance: of their energy.
@@ -245,12 +248,13 @@ class ContactStepper:
         none = Batches(np.zeros(0, np.float32), np.zeros(0), *np.zeros((4, 0), np.int32))
         self._batches = more_batches(none, patches // self.simd.width + 1, self.simd.width)
         self._begins = np.zeros(256, np.int64)
-        self._work_queue, self._waypoints = empty_work_queue(), Waypoints(np.zeros(0), np.zeros((0, n, STATE)))
+        self._work_queue, self._waypoints = empty_work_queue(), make_waypoints(0, n)
         self._places_of_bodies = aligned(n + 1)
         self._part = np.zeros(n, np.int64)
-        self.step_length = world.accuracy.step * parts.step
+        self.step_length, self.alone_length = world.accuracy.step * parts.step, world.accuracy.step * parts.alone
         self._least_sub_steps = LEAST_SUB_STEPS / parts.sub_step
         self.motion = world.accuracy.substep_motion * parts.motion
+        self._motion_of_new = np.inf if parts == COARSE else self.motion
         self.straight = world.accuracy.substep_motion * parts.straight
         self.kept = KEPT * self.motion
         # Balls and moving supports: all contacts are found again in the middle of a step.
@@ -263,10 +267,10 @@ class ContactStepper:
             self._convex, self.bodies, self.balance, self.order, self._cornered, world.coefficients
         )
         self._step = Step(
-            h=0.0, ahead=0.0, same=SAME * self.motion, first_kept=0.0, kept=self.kept, fall=0.0, strength=0.0, soft=np.zeros((2, 3)),
-            sub_steps=1, parts=1, law=LAWS[world.accuracy.restitution], all_quick=self._all_quick, is_special=is_special, has_frames=False,
-            most_cores=self._shares, many_pairs=self._sharing.pairs, many_general=self._sharing.general_pairs,
-            many_batches=self._sharing.batches,
+            h=0.0, ahead=0.0, same=SAME * self.motion, first_kept=0.0, kept=self.kept, motion=np.inf, fall=0.0, strength=0.0,
+            soft=np.zeros((2, 3)), sub_steps=1, parts=1, law=LAWS[world.accuracy.restitution],
+            all_quick=self._all_quick, is_special=is_special, has_frames=False, most_cores=self._shares,
+            many_pairs=self._sharing.pairs, many_general=self._sharing.general_pairs, many_batches=self._sharing.batches,
         )  # fmt: skip
 
     def _make_bodies(self) -> SolverBodies:
@@ -332,7 +336,7 @@ class ContactStepper:
         self.members = members
         self._part[:] = OUTSIDE
         self._part[supports], self._part[members] = SUPPORT, MEMBER
-        fineness = fineness or Fineness(self.sub_step(members) / self._unlike(), self.motion)
+        fineness = fineness or Fineness(self.sub_step(members) / self._unlike(), self.motion, self._motion_of_new)
         load_bodies(self.bodies, self.order, run.state.now, run.acceleration, self.world.inv_mass, self._part)
         pairs, strength = self.table.pairs, float(self.world.steady_strength[members].max(initial=0.0))
         fall = 0.5 * ahead * strength
@@ -349,8 +353,8 @@ class ContactStepper:
         parts = min(max(math.ceil(motion / fineness.motion), needed, 1), max(sub_steps // LEAST_SUB_STEPS_BETWEEN, 1))
         part, h = ahead / parts, ahead / sub_steps
         self._step = self._step._replace(
-            h=h, ahead=part, first_kept=kept, fall=0.5 * part * strength, strength=strength, soft=softness(h, fineness.sub_step),
-            sub_steps=sub_steps, parts=parts, all_quick=self._all_quick,
+            h=h, ahead=part, first_kept=kept, motion=fineness.motion_of_new, fall=0.5 * part * strength, strength=strength,
+            soft=softness(h, fineness.sub_step), sub_steps=sub_steps, parts=parts, all_quick=self._all_quick,
         )  # fmt: skip
         capacity = share_of(len(pairs.first), self._shares, self._shares)
         if capacity > len(self._places):
@@ -365,11 +369,6 @@ class ContactStepper:
         """Parts of the step that is set up: contacts are looked for again between them."""
         return self._step.parts
 
-    @property
-    def sub_step_length(self) -> float:
-        """Length of its sub-steps, s."""
-        return self._step.h
-
     def _report_fastest(self, run: Run, members: np.ndarray, looks: int, ahead: float) -> None:
         """Say that a member moves too fast: the one whose surface passes most of its own inner radii."""
         now = run.state.now
@@ -380,13 +379,11 @@ class ContactStepper:
 
     def _go_on(self, run: Run, last: int) -> None:
         """Go on with the step that is set up to the stage `last`, or to its end."""
-        how = self._try_stages(last)
-        while how != AT_STAGE:
+        while (how := self._try_stages(last)) != AT_STAGE:
             if how == SHARE:
                 self._share_stage(run)
             else:
                 self._make_space(how, int(self._progress[NEEDED]))
-            how = self._try_stages(last)
 
     def _try_stages(self, last: int) -> int:
         """Go on as far as memory and one core go; returns why not farther."""
@@ -425,8 +422,7 @@ class ContactStepper:
         elif how == MORE_COLOURS:
             self._begins = np.concatenate([self._begins, np.zeros(needed, np.int64)])
         elif how == MORE_WAYPOINTS:
-            time, state = self._waypoints
-            self._waypoints = Waypoints(np.resize(time, needed), np.resize(state, (needed, *state.shape[1:])))
+            self._waypoints = grown_waypoints(self._waypoints, needed)
         else:
             self._batches = more_batches(self._batches, needed, self.simd.width)
 
@@ -556,41 +552,41 @@ class ContactStepper:
 
     def step(self, run: Run, begin: float, end: float) -> Outcome:
         """Step what `set_up` put before the kernels from `begin` to `end`, s."""
-        self.begin_step(run, begin, end)
+        has_frames = self.begin_step(run, begin, end)
         self._go_on(run, END)
         note_pressed(self.bodies, self.order, self.pressed)
-        out = self.end_step()
+        out = self.end_step(self._waypoints if has_frames else None)
         out.given[:] = 0.0
         return out
 
-    def sub_steps_between(self, run: Run, hand_over: Callable[[], None]) -> Iterator[int]:
-        """Numbers of sub-steps, which the caller makes, from look to look of a step; hand_over: called before each look."""
+    def step_by(self, run: Run, solve: Callable[[int, float], None]) -> None:
+        """Step what was set up, and begun, with another solver; solve: makes as many sub-steps of such a length, s, and waypoints."""
         progress = self._progress
-        self._step = self._step._replace(all_quick=True)
+        self._step = self._step._replace(all_quick=True, has_frames=False)
         self._go_on(run, LIST)
         while progress[STAGE] != END:
-            yield int(progress[SOME])
-            hand_over()
+            solve(int(progress[SOME]), self._step.h)
             progress[STAGE] = NEXT
             self._go_on(run, LIST)
 
-    def begin_step(self, run: Run, begin: float, end: float) -> None:
-        """Remember the energies of the members, and whether frames fall between `begin` and `end`, s."""
-        self._step = self._step._replace(has_frames=run.recorder.has_frames(begin, end))
+    def begin_step(self, run: Run, begin: float, end: float) -> bool:
+        """Remember the energies of the members; returns whether frames fall between `begin` and `end`, s."""
+        has_frames = run.recorder.has_frames(begin, end)
+        self._step = self._step._replace(has_frames=has_frames)
+        self._waypoints.number[0] = 0
         begin_balance(self.balance, self.bodies, self._weights)
+        return has_frames
 
-    def end_step(self) -> Outcome:
-        """Balance the energy, and say where the members are."""
+    def end_step(self, waypoints: Waypoints | None) -> Outcome:
+        """Balance the energy, and say where the members are; waypoints: of all bodies, by rank."""
         bodies, balance, members, at = self.bodies, self.balance, self.members, self.rank[self.members]
         # Sub-steps must not make energy beyond what moving supports and drives gave.
         given = balance.given[at]
         end_balance(balance, bodies, self._weights)
         velocity = bodies.velocity.reshape(-1, ROW)[at, :6]
-        waypoints, count = None, self._progress[WAYPOINTS]
-        if self._step.has_frames:
-            waypoints = Waypoints(self._waypoints.time[:count].copy(), self._waypoints.state[:count, at])
+        own = None if waypoints is None else waypoints_of(waypoints, at)
         return Outcome(
-            members, bodies.position[at], bodies.orientation[at], velocity, balance.taken[at], balance.raised[at], given, waypoints
+            members, bodies.position[at], bodies.orientation[at], velocity, balance.taken[at], balance.raised[at], given, own
         )  # fmt: skip
 
 

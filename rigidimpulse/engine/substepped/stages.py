@@ -56,6 +56,7 @@ from rigidimpulse.dynamics.solvers.tgs_soft.records import (
     place_patches,
 )
 from rigidimpulse.dynamics.solvers.tgs_soft.solver import Solve, SpecialPatches, advance, special_patches
+from rigidimpulse.motion.waypoints import Waypoints, add_waypoint
 
 FIND, ASK, MARK, SEARCH, STORE, PLAN, LIST, SOLVE, KEEP, NEXT, LOOK, END = range(12)
 """Stages."""
@@ -67,18 +68,16 @@ GOES_ON, AT_STAGE, SHARE, NEEDS_GENERAL = map(np.int64, range(4))
 """The same, for space, of which progress[NEEDED] is wanted."""
 (
     STAGE, IS_AGAIN, PART, LENGTH, LEFT, SOME, LOOKED_AT, WAITING, FOUND, BEGUN, COLOURS_BEGUN, BATCHES_BEGUN, COUNT, COLOURS, BATCHES,
-    BALLS, REBOUNDS, SUPPORTS, NEEDED, MADE, WAYPOINTS, COLUMNS,
-) = range(22)  # fmt: skip
+    BALLS, REBOUNDS, SUPPORTS, NEEDED, MADE, COLUMNS,
+) = range(21)  # fmt: skip
 """Columns of progress: stage; 1 after the first look; part of the step, its sub-steps, those left, and those until the next look; pairs
 that were looked at, general ones that wait, their contacts; patches, colours and batches that were made at earlier looks, and all of them;
-special patches; what is needed; sub-steps that were made; waypoints."""
+special patches; what is needed; sub-steps that were made."""
 COARSEST = 0.3
 """Inner radii by which bodies with inset surfaces may pass each other from look to look: sub-steps are made shorter for it."""
 TURNED = 2.0 * TILT
 """Angle by which meshes may turn against each other from look to look, rad: of their corners those that come down by less are found. A die
 that turned by twice that over an edge, in a cup, was 3.5 mm inside of it."""
-STATE = 13
-"""Numbers of a body in `Waypoints`."""
 LEAST_SUB_STEPS_BETWEEN = 2
 """Sub-steps from look to look."""
 QUICK = 0.4
@@ -108,13 +107,6 @@ class General(NamedTuple):
     contacts: Contacts
 
 
-class Waypoints(NamedTuple):
-    """Where n bodies are at the looks in the middle of a step, by rank."""
-
-    time: np.ndarray  # (w,) s, from the start of the step
-    state: np.ndarray  # (w, n, 13) position, orientation, velocity, angular velocity
-
-
 class Memory(NamedTuple):
     """Contacts, their records, and scratch memory; it may grow between two stages."""
 
@@ -130,7 +122,7 @@ class Memory(NamedTuple):
     begins: np.ndarray  # (c+1,) where the batches of colours begin
     places_of_bodies: np.ndarray  # (8 (n+1),) of `place_bodies`
     work_queue: np.ndarray  # of several cores that solve
-    waypoints: Waypoints
+    waypoints: Waypoints  # by rank
 
 
 class Step(NamedTuple):
@@ -141,6 +133,7 @@ class Step(NamedTuple):
     same: float  # inner radii, see `contact_cache.Limits`
     first_kept: float  # of the first look
     kept: float  # of later ones
+    motion: float  # inner radii that what comes to contact in the middle of the step moves until it is looked at again
     fall: float  # m/s, see `contact_cache.Limits`
     strength: float  # m/s2, of steady forces
     soft: np.ndarray  # (2, 3), see `softness`
@@ -149,7 +142,7 @@ class Step(NamedTuple):
     law: int  # of restitution
     all_quick: bool  # all contacts are found again in the middle of the step
     is_special: bool  # whether there may be special patches
-    has_frames: bool  # whether frames fall into the step: the waypoints are kept
+    has_frames: bool  # whether frames fall into the step: looks are waypoints
     most_cores: int
     many_pairs: int  # beyond which several cores look at them
     many_general: int  # the same of general pairs
@@ -275,7 +268,8 @@ def _plan(island, memory, step, progress):
     """
     bodies, pairs, left = island.bodies, memory.table.pairs, progress[LEFT]
     ahead = step.ahead * left / progress[LENGTH]
-    pieces = pieces_of(bodies, pairs, island.cornered, most_motion(bodies, pairs, ahead), ahead)
+    motion = most_motion(bodies, pairs, ahead)
+    pieces = max(pieces_of(bodies, pairs, island.cornered, motion, ahead), motion / step.motion)
     # Speeds may be no numbers by now: the end of the step finds them.
     number = np.int64(ceil(pieces)) if pieces < left else left
     progress[SOME] = min(max(left // max(number, 1), LEAST_SUB_STEPS_BETWEEN), left)
@@ -351,30 +345,18 @@ def _keep(simd, island, memory, progress):
 
 
 @jit
-def _keep_waypoint(bodies, waypoints, time, number):
-    """Write where bodies are at `time` s from the start of the step as waypoint `number`."""
-    waypoints.time[number] = time
-    for i in range(waypoints.state.shape[1]):
-        row = waypoints.state[number, i]
-        for k in range(3):
-            row[k] = bodies.position[i, k]
-        for k in range(4):
-            row[3 + k] = bodies.orientation[i, k]
-        for k in range(6):
-            row[7 + k] = bodies.velocity[8 * i + k]
-
-
-@jit
 def _next(island, memory, step, progress):
     """Sub-steps have been made: look again, unless that was the end of the step."""
-    number = progress[WAYPOINTS]
-    if step.has_frames and number == memory.waypoints.time.shape[0]:
-        progress[NEEDED] = 2 * number + 1
+    waypoints, velocity = memory.waypoints, island.bodies.velocity
+    if step.has_frames and waypoints.number[0] == waypoints.time.shape[0]:
+        progress[NEEDED] = 2 * waypoints.time.shape[0] + 1
         return MORE_WAYPOINTS
     progress[MADE] += progress[SOME]
     if step.has_frames:
-        _keep_waypoint(island.bodies, memory.waypoints, step.h * progress[MADE], number)
-        progress[WAYPOINTS] += 1
+        number = add_waypoint(waypoints, step.h * progress[MADE], island.bodies)
+        for i in range(waypoints.state.shape[1]):
+            for k in range(6):
+                waypoints.state[number, i, 7 + k] = velocity[8 * i + k]
     progress[LEFT] -= progress[SOME]
     progress[STAGE] = LOOK
     if progress[LEFT] == 0:

@@ -1,7 +1,7 @@
 """Frames in the middle of a step of sub-stepped islands.
 
-The trajectory of a member leads straight to where it is at the end of the step. Frames in between are written along the looks at contacts,
-where the solver knows poses and velocities, and from look to look as `depart` goes.
+The trajectory of a member leads straight to where it is at the end of the step. Frames in between are written along waypoints, the looks at
+contacts or the sub-steps of islands with joints, and from one to the next as `depart` goes.
 """
 
 from __future__ import annotations
@@ -10,11 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.substepped.contact_forces import Outcome
 from rigidimpulse.engine.substepped.trajectories import depart
 from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.trajectory import make_trajectories
 from rigidimpulse.recording.recorder import Recorder
+
+LAST = TOLERANCES.sub_stepping.last_sub_step
 
 
 class Way(NamedTuple):
@@ -32,7 +35,10 @@ def way_of(outcome: Outcome, now: BodyState, begin: float, end: float) -> Way | 
         return None
     first = np.column_stack([now.position[members], now.orientation[members], now.velocity[members], now.angular_velocity[members]])
     last = np.column_stack([outcome.position, outcome.orientation, outcome.velocity])
-    return Way(members, np.concatenate([[begin], begin + waypoints.time, [end]]), np.concatenate([[first], waypoints.state, [last]]))
+    # The last of them is the end, before its energy was balanced.
+    inside = waypoints.time < (end - begin) * (1.0 - LAST)
+    time, state = begin + waypoints.time[inside], waypoints.state[inside]
+    return Way(members, np.concatenate([[begin], time, [end]]), np.concatenate([[first], state, [last]]))
 
 
 def part_of(way: Way, bodies: np.ndarray) -> Way:

@@ -41,10 +41,13 @@ from rigidimpulse.dynamics.solvers.time_stepping.contact_points import (
     sum_given,
 )
 from rigidimpulse.dynamics.solvers.time_stepping.flight import carry_supports, fly_and_close, kick, set_inertia, stiffen
+from rigidimpulse.motion.waypoints import Waypoints, add_waypoint
 
 GIVE_UP, MOST_HALVED = 100.0, 32.0
 ACCURATE, SLIP, LAST = TOLERANCES.sub_stepping.joint_residual, TOLERANCES.sub_stepping.joint_no_slip, TOLERANCES.sub_stepping.last_sub_step
 TINY = TOLERANCES.arithmetic.least_divisor
+TIME, HALVED, GAP = range(3)
+"""Places in `Kept.reached`."""
 
 
 class Kept(NamedTuple):
@@ -55,6 +58,8 @@ class Kept(NamedTuple):
     driven: np.ndarray  # (n,) bool, members that drives, springs or moving supports may give energy to
     before: np.ndarray  # (1,) s, length of the last sub-step, 0 at the start
     given: np.ndarray  # (p, 10) of the pairs in the table of contacts, see `sum_given`
+    reached: np.ndarray  # (3,) s since the start; how many sub-steps were halved; worst gap of a joint at their ends, m or rad
+    waypoints: Waypoints  # sub-steps are written to it as far as there is space
 
 
 @jit_making_arrays
@@ -62,13 +67,12 @@ def step_island(island, bodies, table, coefficients, balance, kept, sub_steps, h
     """Step an island by `sub_steps` sub-steps of h s.
 
     island: its joints and members by rank, with the velocities; bodies: the solver's bodies, with the poses. table: of contacts. balance:
-    its clusters are joined, and it is given the work of drives and moving supports. kept: `Kept`. Returns how many sub-steps were halved,
-    and the worst gap of a joint, m or rad.
+    its clusters are joined, and it is given the work of drives and moving supports. kept: `Kept`.
     """
-    members, now, stiffening = island.members, island.bodies, kept.stiffening
+    members, now, stiffening, reached, waypoints = island.members, island.bodies, kept.stiffening, kept.reached, kept.waypoints
     forget_given(bodies, table.pairs, table.points)
     supports = _supports(bodies)
-    left, step, halved, worst = sub_steps * h, h, np.int64(0), 0.0
+    left, step = sub_steps * h, h
     begin, spin = np.empty((bodies.part.shape[0], 7)), np.empty((bodies.part.shape[0], 3))
     before = np.empty((bodies.part.shape[0], 6))
     set_inertia(bodies, now, members, stiffening)
@@ -81,7 +85,7 @@ def step_island(island, bodies, table, coefficients, balance, kept, sub_steps, h
         if gap > most:
             _take_back(bodies, now, members, begin, before)
             step *= 0.5
-            halved += 1
+            reached[HALVED] += 1.0
             continue
         for i in members:
             for k in range(3):
@@ -89,13 +93,35 @@ def step_island(island, bodies, table, coefficients, balance, kept, sub_steps, h
         carry_supports(bodies, now, supports, step)
         set_inertia(bodies, now, members, stiffening)
         kick(bodies, now, members, 0.5 * step)
-        worst = max(worst, gap)
+        # What is no number stays.
+        if gap > reached[GAP] or np.isnan(gap):
+            reached[GAP] = gap
         left -= step
         kept.before[0] = step
+        reached[TIME] += step
+        if waypoints.number[0] < waypoints.time.shape[0]:
+            _add_waypoint(bodies, now, members, waypoints, reached[TIME])
         # After a halved sub-step the next ones may be whole again.
         step = min(2.0 * step, h)
     sum_given(bodies, table.pairs, table.points, kept.given)
-    return halved, worst
+    _hand_over(bodies, now, members)
+
+
+@jit
+def _add_waypoint(bodies, now, members, waypoints, time):
+    """Write where the members are at `time` [s]."""
+    number = add_waypoint(waypoints, time, bodies)
+    for i in members:
+        for k in range(3):
+            waypoints.state[number, i, 7 + k], waypoints.state[number, i, 10 + k] = now.velocity[i, k], now.angular_velocity[i, k]
+
+
+@jit
+def _hand_over(bodies, now, members):
+    """Give the solver's bodies the velocities of the members."""
+    for i in members:
+        for k in range(3):
+            bodies.velocity[8 * i + k], bodies.velocity[8 * i + 3 + k] = now.velocity[i, k], now.angular_velocity[i, k]
 
 
 @jit_making_arrays
@@ -286,3 +312,4 @@ def stop_island(island, bodies, table, coefficients, balance, kept):
         if driven[members[k]]:
             balance.given[members[k]] += given[k]
     add_forces(island.joints, island.which, rows.impulse[start:], direction, 1.0, kept.moment)
+    _hand_over(bodies, now, members)
