@@ -36,7 +36,7 @@ class ContactBuffer:
     """Contacts as they are found.
 
     Attributes:
-        real: (c, 10) and integer: (c, 5), contacts, see `manifold.dispatch`. scratch: for the walk through two trees.
+        contacts: as kernels take them, until they grow. real: (c, 10) and integer: (c, 5) of them, see `manifold.dispatch`.
 
     """
 
@@ -48,8 +48,8 @@ class ContactBuffer:
             keeps: whether features that are near are kept from question to question (`kept_features`): all are about the same shapes.
 
         """
-        self.real, self.integer = np.empty((contacts, 10)), np.empty((contacts, 5), np.int64)
-        self.scratch = make_contact_scratch.py_func(*((MANY_PAIRS, PLACES, MANY_ROWS) if keeps else (PAIR_CAPACITY, 0, FEW_ROWS)))
+        scratch = make_contact_scratch.py_func(*((MANY_PAIRS, PLACES, MANY_ROWS) if keeps else (PAIR_CAPACITY, 0, FEW_ROWS)))
+        self.contacts = Contacts(np.empty((contacts, 10)), np.empty((contacts, 5), np.int64), scratch)
 
     def find(self, question: Question) -> int:
         """Find the contacts of pairs; returns their number."""
@@ -62,12 +62,17 @@ class ContactBuffer:
     def grow(self, needed: int) -> None:
         """Grow to at least `needed` contacts, and to twice the present capacity."""
         capacity = max(needed, 2 * len(self.real))
-        self.real, self.integer = np.empty((capacity, 10)), np.empty((capacity, 5), np.int64)
+        self.contacts = Contacts(np.empty((capacity, 10)), np.empty((capacity, 5), np.int64), self.contacts.scratch)
 
     @property
-    def contacts(self) -> Contacts:
-        """The arrays as they are now: growing replaces them."""
-        return Contacts(self.real, self.integer, self.scratch)
+    def real(self) -> np.ndarray:
+        """(c, 10)."""
+        return self.contacts.real
+
+    @property
+    def integer(self) -> np.ndarray:
+        """(c, 5)."""
+        return self.contacts.integer
 
 
 def find_together(buffers: list[ContactBuffer], questions: list[Question]) -> list[int]:

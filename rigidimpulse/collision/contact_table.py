@@ -134,11 +134,15 @@ class ContactTable:
         self.pairs, self.taken, self._least = empty_pairs(0), first_points, first_points
         self.lines, self.points, self.ids = _make_points(max(first_points, points_of_a_body * bodies))
         self.free = _parts(1, first_points, shares)
+        self._arrays = Table(self.pairs, self.points, self.ids, self.free)
 
     @property
     def arrays(self) -> Table:
-        """The arrays as they are now: growing replaces them."""
-        return Table(self.pairs, self.points, self.ids, self.free)
+        """The arrays as they are now: growing replaces them. The same tuple as long as they are the same: calls are quicker by it."""
+        now, last = (self.pairs, self.points, self.ids, self.free), self._arrays
+        if any(array is not other for array, other in zip(now, last, strict=True)):
+            self._arrays = last = Table(*now)
+        return last
 
     def replace(self, first: np.ndarray, second: np.ndarray) -> None:
         """Replace the pairs by these, ascending; pairs that stay keep what is known of them."""

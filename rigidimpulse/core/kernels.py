@@ -15,6 +15,7 @@ from numba import types
 from numba.extending import typeof_impl
 
 from rigidimpulse.core.kernel_cache import is_in_cache, jit_with_cache
+from rigidimpulse.core.known_calls import KnownCalls
 from rigidimpulse.core.numba_private import KernelCompiler, PartCompiler, options_of
 
 _numba: Any = numba
@@ -40,7 +41,7 @@ class Kernel:
     taken from a tuple, and was half of the time of kernels that do little for each pair.
 
     Attributes:
-        name: module and function. calls: how often Python called it.
+        name: module and function. calls: how often Python called it. known: calls whose types need not be looked up.
         seconds: how long that took, s, without `preparing`: the first call for each set of types, in which it is compiled or loaded.
 
     """
@@ -52,7 +53,7 @@ class Kernel:
         self.name = f"{function.__module__.removeprefix('rigidimpulse.')}.{function.__name__}"
         self.calls, self.seconds, self.preparing = 0, 0.0, 0.0
         KERNELS.append(self)
-        self._makes_arrays, self._lies_in_cache = makes_arrays, False
+        self._makes_arrays, self._lies_in_cache, self.known = makes_arrays, False, KnownCalls()
         self.part = _njit(**options_of(PartCompiler, makes_arrays), **options)(function)
 
     @cached_property
@@ -60,21 +61,37 @@ class Kernel:
         """The dispatcher that Python calls."""
         return jit_with_cache(self.py_func, nogil=True, **options_of(KernelCompiler, self._makes_arrays))
 
+    @cached_property
+    def _only_call(self) -> Any:
+        """What the dispatcher calls, if it is compiled for one set of types. (Its table of them takes as long as many a call.)"""
+        (compiled,) = self.entry.overloads.values()
+        return compiled.entry_point
+
     def __call__(self, *arguments: Any) -> Any:
         """Call it from Python."""
         if INTERPRETED:
             return self.py_func(*arguments)
+        start = perf_counter()
+        key, call = self.known.find(arguments)
+        if call is not None:
+            result = call(*arguments)
+            self.calls += 1
+            self.seconds += perf_counter() - start
+            return result
         entry = self.entry
-        known, start = len(entry.overloads), perf_counter()
+        number = len(entry.overloads)
         result = entry(*arguments)
         spent = perf_counter() - start
         self.calls += 1
         if self.calls == 1:
             CALLED.append(self)
-        if len(entry.overloads) == known:
-            self.seconds += spent
-        else:
+        if len(entry.overloads) > number:
             self.preparing += spent
+            self.known.forget()
+        else:
+            self.seconds += spent
+            if number == 1:
+                self.known.keep(key, arguments, self._only_call)
         return result
 
     def is_cached(self) -> bool:
@@ -92,6 +109,12 @@ class Kernel:
         self.calls += len(calls)
         self.seconds += perf_counter() - start
         return results
+
+
+def forget_calls() -> None:
+    """Hold no arguments of calls any more: at the end of a run, whose memory is its own again."""
+    for kernel in CALLED:
+        kernel.known.forget()
 
 
 def number_of_cores() -> int:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError, unknown_name
+from rigidimpulse.core.kernels import forget_calls
 from rigidimpulse.core.providers import provider
 from rigidimpulse.engine.begin import begin_run, make_plan
 from rigidimpulse.engine.compile_scene import compile_scene
@@ -184,9 +185,11 @@ def complete(run: Run, duration: float, progress: Callable[[float], None] | None
     """Step a run to its end at `duration` [s], or until `progress` raises `Stopped`; hand back what was recorded."""
     try:
         run_to_end(run, duration, progress)
+        return finish_run(run, duration)
     except Stopped:
         return finish_early(run, duration)
-    return finish_run(run, duration)
+    finally:
+        forget_calls()
 
 
 def chosen_out(scene: Scene, accuracy: str | Accuracy, effects: Mapping[str, bool] | None) -> dict[str, str]:

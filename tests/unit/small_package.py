@@ -24,7 +24,7 @@ kind = next(value for value in vars(tuples).values() if isinstance(value, type) 
 known = outer.is_cached()
 print(outer(kind(10.0, 3.0)), len(outer.entry.stats.cache_hits), known)
 """
-NEEDED = ("kernels.py", "kernel_cache.py", "kernel_places.py", "numba_private.py", "processor.py", "ready_kernels.py")
+NEEDED = ("kernels.py", "kernel_cache.py", "kernel_places.py", "known_calls.py", "numba_private.py", "processor.py", "ready_kernels.py")
 
 
 def make_package(place: Path) -> Path:

@@ -248,13 +248,16 @@ class ContactStepper:
         none = Batches(np.zeros(0, np.float32), np.zeros(0), *np.zeros((4, 0), np.int32))
         self._batches = more_batches(none, patches // self.simd.width + 1, self.simd.width)
         self._begins = np.zeros(256, np.int64)
+        self._held: Memory | None = None
+        self._general_held: General | None = None
         self._work_queue, self._waypoints = empty_work_queue(), make_waypoints(0, n)
         self._places_of_bodies = aligned(n + 1)
         self._part = np.zeros(n, np.int64)
         self.step_length, self.alone_length = world.accuracy.step * parts.step, world.accuracy.step * parts.alone
         self._least_sub_steps = LEAST_SUB_STEPS / parts.sub_step
         self.motion = world.accuracy.substep_motion * parts.motion
-        self._motion_of_new = np.inf if parts == COARSE else self.motion
+        # Where a step is cut into pieces, what is new is known when the next one begins.
+        self._motion_of_new = self.motion if parts.alone > parts.step else np.inf
         self.straight = world.accuracy.substep_motion * parts.straight
         self.kept = KEPT * self.motion
         # Balls and moving supports: all contacts are found again in the middle of a step.
@@ -264,13 +267,14 @@ class ContactStepper:
         self._places, self._margins = np.zeros(0, np.int64), np.zeros(0)
         self.members, self._progress = np.zeros(0, np.int64), np.zeros(COLUMNS, np.int64)
         self._island = Island(
-            self._convex, self.bodies, self.balance, self.order, self._cornered, world.coefficients
+            self._convex, self.bodies, self.balance, self._weights, self.order, self._cornered, world.coefficients
         )
         self._step = Step(
             h=0.0, ahead=0.0, same=SAME * self.motion, first_kept=0.0, kept=self.kept, motion=np.inf, fall=0.0, strength=0.0,
             soft=np.zeros((2, 3)), sub_steps=1, parts=1, law=LAWS[world.accuracy.restitution],
-            all_quick=self._all_quick, is_special=is_special, has_frames=False, most_cores=self._shares,
-            many_pairs=self._sharing.pairs, many_general=self._sharing.general_pairs, many_batches=self._sharing.batches,
+            all_quick=self._all_quick, is_special=is_special, has_frames=False, balances=False,
+            most_cores=self._shares, many_pairs=self._sharing.pairs, many_general=self._sharing.general_pairs,
+            many_batches=self._sharing.batches,
         )  # fmt: skip
 
     def _make_bodies(self) -> SolverBodies:
@@ -350,11 +354,14 @@ class ContactStepper:
             self._report_fastest(run, members, needed, ahead)
             needed = MOST_LOOKS
         sub_steps = max(math.ceil(ahead / fineness.sub_step - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
-        parts = min(max(math.ceil(motion / fineness.motion), needed, 1), max(sub_steps // LEAST_SUB_STEPS_BETWEEN, 1))
+        # What is stepped at once because nothing else meets it is looked at, and its energy balanced, as often as if it were not.
+        pieces_at_once = math.ceil(ahead / self.step_length - 1e-9)
+        parts = min(max(math.ceil(motion / fineness.motion), needed, pieces_at_once, 1), max(sub_steps // LEAST_SUB_STEPS_BETWEEN, 1))
         part, h = ahead / parts, ahead / sub_steps
         self._step = self._step._replace(
             h=h, ahead=part, first_kept=kept, motion=fineness.motion_of_new, fall=0.5 * part * strength, strength=strength,
             soft=softness(h, fineness.sub_step), sub_steps=sub_steps, parts=parts, all_quick=self._all_quick,
+            balances=pieces_at_once > 1,
         )  # fmt: skip
         capacity = share_of(len(pairs.first), self._shares, self._shares)
         if capacity > len(self._places):
@@ -392,16 +399,22 @@ class ContactStepper:
         return go_on(self.simd, self._island, self._memory(), self._general(), self._step, self._progress, last)
 
     def _memory(self) -> Memory:
-        """The arrays as they are now."""
+        """The arrays as they are now; the same tuple as long as they are the same, as in `ContactTable.arrays`."""
         table = self.table
-        return Memory(
+        now = (
             table.arrays, table.lines, self._places, self._margins, self._workspaces[0], self._patches, self._lists, self._target,
             self._batches, self._begins, self._places_of_bodies, self._work_queue, self._waypoints,
         )  # fmt: skip
+        if self._held is None or any(array is not other for array, other in zip(now, self._held, strict=True)):
+            self._held = Memory(*now)
+        return self._held
 
     def _general(self) -> General:
-        """What general pairs need."""
-        return General(self._smaller, self.world.shape_of_body, self._taken_off, self._asked, self._buffers[0].contacts)
+        """What general pairs need; the same tuple, likewise."""
+        asked, contacts = self._asked, self._buffers[0].contacts
+        if self._general_held is None or self._general_held.asked is not asked or self._general_held.contacts is not contacts:
+            self._general_held = General(self._smaller, self.world.shape_of_body, self._taken_off, asked, contacts)
+        return self._general_held
 
     def _make_space(self, how: int, needed: int) -> None:
         """Make space for what had none."""

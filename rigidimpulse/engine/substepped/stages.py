@@ -44,7 +44,7 @@ from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.simd import width_of
 from rigidimpulse.dynamics.solvers.tgs_soft.bodies import SolverBodies
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import mark_quick
-from rigidimpulse.dynamics.solvers.tgs_soft.energy_balance import Balance, connect
+from rigidimpulse.dynamics.solvers.tgs_soft.energy_balance import Balance, Weights, begin_part, connect, end_balance
 from rigidimpulse.dynamics.solvers.tgs_soft.fill import fill, keep_impulses, place_bodies
 from rigidimpulse.dynamics.solvers.tgs_soft.records import (
     POINTS,
@@ -92,6 +92,7 @@ class Island(NamedTuple):
     convex: Convex
     bodies: SolverBodies
     balance: Balance
+    weights: Weights
     order: np.ndarray  # (n,) index of each
     cornered: np.ndarray  # (n,) bool, see `most_turn`
     coefficients: np.ndarray  # (k, k, 4), see material.combine
@@ -143,6 +144,7 @@ class Step(NamedTuple):
     all_quick: bool  # all contacts are found again in the middle of the step
     is_special: bool  # whether there may be special patches
     has_frames: bool  # whether frames fall into the step: looks are waypoints
+    balances: bool  # whether the energy is balanced at the end of each part of the step
     most_cores: int
     many_pairs: int  # beyond which several cores look at them
     many_general: int  # the same of general pairs
@@ -352,11 +354,6 @@ def _next(island, memory, step, progress):
         progress[NEEDED] = 2 * waypoints.time.shape[0] + 1
         return MORE_WAYPOINTS
     progress[MADE] += progress[SOME]
-    if step.has_frames:
-        number = add_waypoint(waypoints, step.h * progress[MADE], island.bodies)
-        for i in range(waypoints.state.shape[1]):
-            for k in range(6):
-                waypoints.state[number, i, 7 + k] = velocity[8 * i + k]
     progress[LEFT] -= progress[SOME]
     progress[STAGE] = LOOK
     if progress[LEFT] == 0:
@@ -364,6 +361,14 @@ def _next(island, memory, step, progress):
         progress[LENGTH] = progress[LEFT] = length_of_part(step.sub_steps, step.parts, progress[PART])
         if progress[PART] == step.parts:
             progress[STAGE] = END
+        elif step.balances:
+            end_balance(island.balance, island.bodies, island.weights)
+            begin_part(island.balance, island.bodies, island.weights)
+    if step.has_frames:
+        number = add_waypoint(waypoints, step.h * progress[MADE], island.bodies)
+        for i in range(waypoints.state.shape[1]):
+            for k in range(6):
+                waypoints.state[number, i, 7 + k] = velocity[8 * i + k]
     return GOES_ON
 
 

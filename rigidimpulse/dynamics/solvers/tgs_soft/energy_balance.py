@@ -48,7 +48,7 @@ class Balance(NamedTuple):
     held: np.ndarray  # (n+1,) bool, there was something that is no member at a contact or a joint
     before: np.ndarray  # (n+1,) J, energy of the body at the start
     given: np.ndarray  # (n+1,) J, work of moving supports on the body
-    taken: np.ndarray  # (n+1,) J, taken off its speed at the end
+    taken: np.ndarray  # (n+1,) J, taken off its speed at the ends of the parts of a step
     raised: np.ndarray  # (n+1,) J, what a cluster gained and cannot pay, of its root
 
 
@@ -178,8 +178,16 @@ def _free_clusters(balance, bodies):
 def begin_balance(balance, bodies, weights):
     """Forget the last step, and remember the energy of each member."""
     for i in range(balance.parent.shape[0]):
+        balance.taken[i] = balance.raised[i] = 0.0
+    begin_part(balance, bodies, weights)
+
+
+@jit
+def begin_part(balance, bodies, weights):
+    """Begin a part of a step: forget what was connected, and remember the energy of each member; what was taken and raised adds up."""
+    for i in range(balance.parent.shape[0]):
         balance.parent[i], balance.touched[i], balance.held[i] = i, False, False
-        balance.given[i] = balance.taken[i] = balance.before[i] = balance.raised[i] = 0.0
+        balance.given[i] = balance.before[i] = 0.0
     for i in range(weights.mass.shape[0]):
         if bodies.part[i] == MEMBER:
             balance.before[i] = _energy(bodies, weights, i)[1]
@@ -219,20 +227,21 @@ def end_balance(balance, bodies, weights):
         root = cluster[0]
         free[root] = True
         if gained[root] > 0.0:
-            balance.raised[root] = max(gained[root] - _pay_together(bodies, weights, cluster, gained[root]), 0.0)
+            balance.raised[root] += max(gained[root] - _pay_together(bodies, weights, cluster, gained[root]), 0.0)
             for i in cluster:
-                balance.taken[i] = own[i] - _energy(bodies, weights, i)[0]
+                balance.taken[i] += own[i] - _energy(bodies, weights, i)[0]
     for i in range(n):
         if bodies.part[i] != MEMBER or not balance.touched[i]:
             continue
         root = root_of(balance.parent, i)
         if free[root]:
             continue
-        balance.raised[root] = max(gained[root] - kinetic[root], 0.0)
+        if i == root:
+            balance.raised[root] += max(gained[root] - kinetic[root], 0.0)
         if gained[root] > 0.0 and kinetic[root] > 0.0:
             share = min(gained[root] / kinetic[root], 1.0)
             _slow_down(bodies, i, sqrt(1.0 - share))
-            balance.taken[i] = share * own[i]
+            balance.taken[i] += share * own[i]
 
 
 @jit_making_arrays
