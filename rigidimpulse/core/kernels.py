@@ -90,7 +90,8 @@ class Kernel:
             self.known.forget()
         else:
             self.seconds += spent
-            if number == 1:
+            # Without values that it has by default a call cannot be made at once.
+            if number == 1 and len(arguments) == self.py_func.__code__.co_argcount:
                 self.known.keep(key, arguments, self._only_call)
         return result
 

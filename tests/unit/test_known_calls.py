@@ -39,6 +39,11 @@ def _length_of(step):
     return step.length * step.number
 
 
+@jit
+def _scaled(values, factor=3.0):
+    return factor * values[0]
+
+
 def _columns(kind: Any, step: int = 1) -> _Columns:
     values = np.arange(1, 13).astype(kind)[::step]
     return _Columns(values, values + kind(1), values[::-1].copy() if step == 1 else values[::-1])
@@ -54,6 +59,12 @@ def test_a_call_is_that_of_its_own_types() -> None:
             for weight in (*weights, locked):
                 for scale in (2.0, 2, np.float64(0.5), True):
                     assert _total(columns, weight, scale) == pytest.approx(_total.py_func(columns, weight, scale), rel=1e-6)
+
+
+def test_what_is_left_out_has_its_default() -> None:
+    for _ in range(3):
+        assert _scaled(np.ones(1)) == 3.0
+        assert _scaled(np.ones(1), 2.0) == 2.0
 
 
 def test_a_tuple_that_took_the_place_of_another_is_not_taken_for_it() -> None:

@@ -340,6 +340,7 @@ class ContactStepper:
         self.members = members
         self._part[:] = OUTSIDE
         self._part[supports], self._part[members] = SUPPORT, MEMBER
+        has_joints = fineness is not None
         fineness = fineness or Fineness(self.sub_step(members) / self._unlike(), self.motion, self._motion_of_new)
         load_bodies(self.bodies, self.order, run.state.now, run.acceleration, self.world.inv_mass, self._part)
         pairs, strength = self.table.pairs, float(self.world.steady_strength[members].max(initial=0.0))
@@ -354,8 +355,9 @@ class ContactStepper:
             self._report_fastest(run, members, needed, ahead)
             needed = MOST_LOOKS
         sub_steps = max(math.ceil(ahead / fineness.sub_step - 1e-9), LEAST_SUB_STEPS_BETWEEN * needed, 1)
-        # What is stepped at once because nothing else meets it is looked at, and its energy balanced, as often as if it were not.
-        pieces_at_once = math.ceil(ahead / self.step_length - 1e-9)
+        # What is stepped at once because nothing else meets it is looked at, and its energy balanced, as often as if it were not. Islands
+        # with joints always are, and the work of their drives counts for the whole of it.
+        pieces_at_once = 1 if has_joints else math.ceil(ahead / self.step_length - 1e-9)
         parts = min(max(math.ceil(motion / fineness.motion), needed, pieces_at_once, 1), max(sub_steps // LEAST_SUB_STEPS_BETWEEN, 1))
         part, h = ahead / parts, ahead / sub_steps
         self._step = self._step._replace(

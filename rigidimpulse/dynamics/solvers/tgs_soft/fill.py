@@ -2,8 +2,7 @@
 
 With unit normal n, from a to b, tangents t_1, t_2 (t_1 x t_2 = n), points c_a on a and c_b on b, and their gap n.(c_b - c_a), impulses
 act at one point s c_a + (1 - s) c_b, so that no torque is left over: mid-way (s = 1/2), or on the surface of what can move, so that it
-rolls. The centre O of a patch is the mean of these points, at the height of the one with the least gap; r_a and r_b are the arms to it. The
-points are taken to lie at O + x t_1 + y t_2: what touches first does.
+rolls. The centre O of a patch is the mean of these points, r_a and r_b the arms to it, and the points lie at O + x t_1 + y t_2.
 
 With M_i the inverse inertia of body i, K = (1 / m_a + 1 / m_b) 1 + sum of -[r_i] M_i [r_i] is how impulses at O change the relative
 velocity there, [r] x = r x x; a torque m turns the patch by M m, M = M_a + M_b. An impulse p n at (x, y) is p n at O and the torque
@@ -62,8 +61,6 @@ from rigidimpulse.dynamics.solvers.tgs_soft.records import (
     Y,
 )
 
-FAR = 1e30
-"""A gap larger than any, m."""
 STEEP = 0.57735
 """First component of a normal beyond which its first tangent lies across the third axis."""
 
@@ -128,12 +125,11 @@ def _tangents(simd, n):
 
 @inlined
 def _points(simd, batches, k, lines, places, rotations, share, axes):
-    """Places, from the first of them, and gaps of the points of batch k into its record; returns the first and the centre from it."""
+    """Places, from the first of them, and gaps of the points of batch k into its record; returns the first and their mean from it."""
     (pa, pb), (ra, rb), (n, t, u) = places, rotations, axes
     w = width_of(simd)
     record, zero, one = batches.record, spread(simd, 0.0), spread(simd, 1.0)
     rest, number, base, mean = one - share, zero, (zero, zero, zero), (zero, zero, zero)
-    least, height = spread(simd, FAR), zero
     between = less(linear(pb), linear(pa))
     for c in range(batches.points[k]):
         g = (k * FIELDS + POINT + POINT_SIZE * c) * w
@@ -155,12 +151,8 @@ def _points(simd, batches, k, lines, places, rotations, share, axes):
         here = where_greater(second[SKIN - ROW], zero, one, zero)
         store(record, g + MASS * w, here)
         number, mean = number + here, along(mean, here, x)
-        nearer = where_greater(least, gap, here, zero)
-        least, height = where_greater(nearer, zero, gap, least), where_greater(nearer, zero, dot(n, x), height)
     inverse = one / where_greater(number, zero, number, one)
-    mean = (mean[0] * inverse, mean[1] * inverse, mean[2] * inverse)
-    # At the mean of the heights a box that lands on a corner would have friction half-way to the next one: it kept 0.83 of its speed.
-    return base, along(mean, height - dot(n, mean), n)
+    return base, (mean[0] * inverse, mean[1] * inverse, mean[2] * inverse)
 
 
 @inlined
