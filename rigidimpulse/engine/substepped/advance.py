@@ -566,8 +566,9 @@ class SubsteppedIslands:
         So they do where others may meet members in the step: what meets a body that turns, in the middle of its straight way, meets it
         elsewhere than it is.
         """
-        stepper, meets = self.stepper, pair_events.may_meet(members)
-        step, straight = (stepper.step_length, stepper.straight) if meets else (stepper.alone_length, np.inf)
+        stepper, step, straight = self.stepper, self.stepper.step_length, self.stepper.straight
+        if (len(joints) or stepper.alone_length > step) and not pair_events.may_meet(members):
+            step, straight = stepper.alone_length, np.inf
         if len(joints) and len(self._solved_together(run, members)) == len(np.unique(self.label[members])):
             step = run.world.accuracy.step
         stray = most_stray(run.state.now, members, stepper.pressed | self._finer, stepper.reach, stepper.skin, straight)
