@@ -9,7 +9,8 @@ The exact regime is more accurate, so it is used wherever it can be afforded. "a
                 sub-stepped island
     or joints   an island with joints, each body of which the exact regime solved more than EXPENSIVE_JOINTED times a step, in the mean
                 of the last ones, or EXPENSIVE_SWING times where nothing is near it: by as much less often as it has more bodies than
-                SMALL. A body that hangs alone stays exact, and so does what rolling friction may act on
+                SMALL. One of at least FEW bodies that something is near is `costly` as others are, in the mean of the last steps. A
+                body that hangs alone stays exact, and so does what rolling friction may act on
     or runaway  in the middle of a step, an island of which a body was solved more than RUNAWAY times in the step, or by as much less
                 often as it has more bodies than LARGE: it costs more than it advances. So do islands in which two bodies come to contact
                 again and again and no impulse keeps them apart. They are handed over at that instant, whatever they are made of.
@@ -20,10 +21,10 @@ and, where an island begins to be sub-stepped (a body that comes near later is t
 
     alike       no two neighbours of masses beyond RATIO : 1; where joints are, contacts and joints are solved exactly at any ratio
     dull        no restitution above REBOUND, or ELASTIC where joints are: a rebound is found at the end of the step only
-    low         no body more than TALL others above a support: long columns want exact rows; not asked where joints are, nor where bodies
-                were solved more than EXPENSIVE_TALL times, by as much less often as the island has more bodies than SMALL: a column
-                that stands takes a few, a chain of rings that swings takes sixty. Nor of a CROWD
-                of more than PAIRS pairs a body, more than layers of bricks have: one exact solution takes as long as seconds of sub-steps
+    low         no body more than TALL others above a support: long columns want exact rows; not asked where joints are, nor where each
+                body was solved more than EXPENSIVE_TALL times in the last step, in the mean: a column that stands takes a few, a chain of
+                rings that swings takes thirty. Nor of a CROWD of more than PAIRS pairs a body, more than layers of bricks have: one
+                exact solution takes as long as seconds of sub-steps
 
 In scenes of fewer than SOME movable bodies without joints only what has joints or runs away is sub-stepped. "cheapest" asks what islands
 cost, and nothing else of the above: see `cheapest.py`. "substepped" takes every island that touches something or has joints.
@@ -45,8 +46,8 @@ from rigidimpulse.motion.body_state import BodyState
 MANY, SOME, FEW, KEPT = 60, 12, 8, 2
 ASK = -1.0
 """`SolveCounts.most` where it is asked at every step whether islands begin to be sub-stepped."""
-EXPENSIVE_SOLVES = 6.0
-EXPENSIVE_JOINTED, EXPENSIVE_SWING, EXPENSIVE_TALL, SMALL = 48.0, 300.0, 200.0, 8.0
+EXPENSIVE_SOLVES, EXPENSIVE_TALL = 6.0, 16.0
+EXPENSIVE_JOINTED, EXPENSIVE_SWING, SMALL = 48.0, 300.0, 8.0
 RATIO, REBOUND, ELASTIC, TALL = 30.0, 0.5, 0.9, 12
 CROWD, PAIRS = 128, 4.0
 FAST, SPIN = 0.5, 2.5 / 16.0
@@ -81,7 +82,7 @@ def may_begin(most: float, joined: np.ndarray, solve_count: np.ndarray) -> bool:
 
     solve_count: (n,) how often the exact solver dealt with each body in the last step; with those that have joints, in the mean of steps.
     """
-    return float(solve_count.sum()) > most or bool(np.any(joined & (SMALL * solve_count > EXPENSIVE_JOINTED)))
+    return float(solve_count.sum()) > most or bool(np.any(joined & (solve_count > EXPENSIVE_SOLVES)))
 
 
 def most_solves_of_all(world: World) -> float:
@@ -122,14 +123,13 @@ def island_roots(number: int, first: np.ndarray, second: np.ndarray, movable: np
 
 
 def solves_in_islands(root: np.ndarray, solve_count: np.ndarray) -> np.ndarray:
-    """How often a body of each island (n,), by its root, was solved in the mean, by as much more as it has more bodies than SMALL.
+    """How often a body of each island (n,), by its root, was solved in the mean.
 
     root: (n,) of every body, -1 for those in no island; solve_count: (n,) how often the exact solver dealt with each body in a step.
     """
     members = np.flatnonzero(root >= 0)
     size = np.bincount(root[members], minlength=len(root))
-    solves = np.bincount(root[members], weights=solve_count[members], minlength=len(root))
-    return solves / np.maximum(size, 1) * np.maximum(size / SMALL, 1.0)
+    return np.bincount(root[members], weights=solve_count[members], minlength=len(root)) / np.maximum(size, 1)
 
 
 def crowded(root: np.ndarray, first: np.ndarray) -> np.ndarray:
@@ -211,13 +211,14 @@ def refusals(
     if not auto:
         return dict.fromkeys(np.flatnonzero((size > 0) & ~touches & ~has_joints).tolist(), "alone")
     moving_count = np.bincount(root[members[moves[members]]], minlength=len(root))
-    solves = np.bincount(root[members], weights=solve_count[members], minlength=len(root))
-    expensive = solves > EXPENSIVE_SOLVES * size
+    solves = solves_in_islands(root, solve_count)
+    expensive = solves > EXPENSIVE_SOLVES
     lively_enough = expensive if only_expensive(world) else expensive | (moving_count >= FEW)
     least = np.where(was_substepped, KEPT, np.where(lively_enough, FEW, MANY))
     for r in np.flatnonzero((size > 0) & (size < least) & ~has_joints).tolist():
         out[r] = "few bodies"
-    cheap = solves_in_islands(root, solve_count) <= np.where(touches, EXPENSIVE_JOINTED, EXPENSIVE_SWING)
+    costly = expensive & touches & (size >= FEW)
+    cheap = ~costly & (solves * np.maximum(size / SMALL, 1.0) <= np.where(touches, EXPENSIVE_JOINTED, EXPENSIVE_SWING))
     # Sub-steps have no rolling friction.
     stays_exact = np.full(len(root), True) if world.rolling.size else cheap | (size < KEPT)
     for r in np.flatnonzero(has_joints & ~was_substepped & stays_exact).tolist():
