@@ -156,7 +156,7 @@ def test_limits_hold_and_joints_let_go() -> None:
 
 @pytest.mark.parametrize(("links", "down"), [(7, False), (8, True), (14, True)])
 def test_a_chain_that_lands_is_stepped_where_it_is_expensive(links: int, down: bool) -> None:
-    """At "standard" 8 links and more go to sub-steps; what is left of their energy is the same within 2 %, as is where they lie within 5 mm.
+    """At "standard" 8 links and more go to sub-steps; what is left of their energy is the same within 2 %, their places within 5 mm.
 
     With the limit of small mechanisms, 48 solves a step, all three stay exact.
     """
