@@ -140,7 +140,7 @@ def _add_outer(blocks, place, jacobian, row, first, right, start):
 
 
 @jit
-def _assemble(rows, slope, slot, blocks, right, n):
+def assemble(rows, slope, slot, blocks, right, n):
     """I + Jh^T slope Jh; right (12,): working memory."""
     jacobian, kinds, masters = rows.jacobian, rows.kind, rows.master
     for place in range(blocks.shape[0]):
@@ -254,7 +254,7 @@ def _factor_again(rows, factored, slope):
         same = same and slope[i, 0] == known[i, 0] and slope[i, 1] == known[i, 1] and slope[i, 2] == known[i, 2]
     if same:
         return
-    _assemble(rows, slope, factored.elimination.slot, factored.blocks, factored.right, factored.pivots.shape[0])
+    assemble(rows, slope, factored.elimination.slot, factored.blocks, factored.right, factored.pivots.shape[0])
     factor(factored.elimination, factored.blocks, factored.pivots)
     copy_matrix(slope, known)
 
@@ -302,8 +302,8 @@ def _newton(rows, factored, law, search, p, target):
 
 
 @jit
-def _velocities(rows, p, y, u):
-    """y = Jh^T p and u = b + Jh y."""
+def velocities_from_impulses(rows, p, y, u):
+    """From impulses p (r,): y (n, 6) = Jh^T p and velocities u (r,) = b + Jh y."""
     multiply_transposed(rows, p, y)
     multiply(rows, y, u)
     for i in range(u.shape[0]):
@@ -349,7 +349,7 @@ def solve_prepared(rows, factored, target):
     row_weights(rows, weight)
     copy_vector(rows.impulse, trial)
     copy_vector(rows.impulse, q)
-    _velocities(rows, q, y, u)
+    velocities_from_impulses(rows, q, y, u)
     best, largest = natural_residual(rows, u, q, weight), _largest(q)
     k, free_k, failures, stagnant, idle, previous, convex = REGULARISATION_START, REGULARISATION_FREE, 0, 0, 0, best, False
     for _ in range(MAX_OUTER):
@@ -368,7 +368,7 @@ def solve_prepared(rows, factored, target):
             k = min(30.0 * k, 1.0)
             continue
         copy_vector(trial, q)
-        _velocities(rows, q, y, u)
+        velocities_from_impulses(rows, q, y, u)
         reached = natural_residual(rows, u, q, weight)
         now = _largest(q)
         # Larger impulses are accepted only with a residual smaller in proportion: rows that contradict each other have none.

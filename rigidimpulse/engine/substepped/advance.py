@@ -49,7 +49,7 @@ from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.sleeping import advance_sleep_timers, wake_by_contact
 from rigidimpulse.engine.substepped.contact_forces import COARSE, FINE, FINEST, ContactStepper, Fineness, Outcome, joined_outcomes
 from rigidimpulse.engine.substepped.hand_over import HandOver
-from rigidimpulse.engine.substepped.jointed import JointedStepper
+from rigidimpulse.engine.substepped.jointed import FINER, JointedStepper
 from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.substepped.waypoints import Way, part_of, way_of, write_frames
@@ -541,12 +541,17 @@ class SubsteppedIslands:
         return out
 
     def _step_jointed(self, run: Run, members: np.ndarray, span: tuple[float, float], kept: float) -> Outcome | None:
-        """Step an island with joints; None if they stay open."""
+        """Step an island with joints, more finely where it was not held; None if no sub-steps hold it."""
         if self._joint_stepper is None:
             prepare_kernels(self._world, with_events=False, with_substepped=True)
             self._joint_stepper = JointedStepper(run, self.stepper)
-        self._set_up(run, members, span[0], span[1] - span[0], kept, self._joint_stepper.fineness(run, members))
-        return self._joint_stepper.step(run, *span)
+        out = None
+        for finer in FINER:
+            self._set_up(run, members, span[0], span[1] - span[0], kept, self._joint_stepper.fineness(run, members, finer))
+            out = self._joint_stepper.step(run, *span)
+            if out is not None:
+                break
+        return out
 
     def _take_in(self, run: Run, fresh: np.ndarray, time: float) -> None:
         """What exact contact did to bodies ends where they come to a sub-stepped island."""

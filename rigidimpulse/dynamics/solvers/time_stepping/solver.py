@@ -13,8 +13,8 @@ its ends makes a free body's path the parabola. At the end of all sub-steps impu
     J_1 (v + M^-1 J_1^T nu) = 0
 
 A sub-step whose joints stay open by more than GIVE_UP of what is allowed is taken back and halved, down to 1 / MOST_HALVED of its length.
-Contacts and joints feel each other in one solve. So loads of any mass ratio are carried: sweeps over contacts and joints in turn would
-need to be the more, the heavier the load.
+Contacts and joints feel each other in one solve, which starts from what sweeps over contacts find with the joints eliminated (`reduced`).
+So loads of any mass ratio are carried: sweeps over contacts and joints in turn would need to be the more, the heavier the load.
 
 Source: Stewart and Trinkle 1996, Anitescu and Potra 1997 (time stepping with contact and friction at velocity level).
 """
@@ -32,6 +32,7 @@ from rigidimpulse.dynamics.constraints.joint import add_forces
 from rigidimpulse.dynamics.constraints.jointed_island import count_joint_rows
 from rigidimpulse.dynamics.constraints.rows import change_velocities, contact_rows
 from rigidimpulse.dynamics.constraints.slip import solve_until_slip
+from rigidimpulse.dynamics.solvers.reduced import start_without_joints
 from rigidimpulse.dynamics.solvers.time_stepping.biases import fill_contact_biases, fill_joint_biases, fill_still_biases
 from rigidimpulse.dynamics.solvers.time_stepping.contact_points import (
     contact_points,
@@ -211,6 +212,7 @@ def _sub_step(island, bodies, table, coefficients, balance, kept, flight, h):
     _set_friction(start_of, contacts, u, SLIP * scale)
     turned, fell = _turned(bodies, members), _falling(bodies, now, members)
     given = _energies(bodies, now, members, turned)
+    start_without_joints(rows, members.shape[0], ACCURATE * scale)
     solve_until_slip(None, start_of, members.shape[0], contacts, ACCURATE * scale, SLIP * scale)
     change_velocities(now, members, rows)
     begin, spin, most = flight
