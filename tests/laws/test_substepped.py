@@ -442,18 +442,20 @@ def on_a_corner(seed: int, size: np.ndarray) -> np.ndarray:
             return turn
 
 
+@pytest.mark.parametrize("step", [1.0 / 60.0, 1.0 / 30.0])
 @pytest.mark.parametrize("friction", [0.0, 0.2, 0.5])
 @pytest.mark.parametrize("seed", [0, 1, 3, 4, 7])
-def test_corners_that_land_rebound_as_by_the_impact_of_a_point(friction: float, seed: int) -> None:
+def test_corners_that_land_rebound_as_by_the_impact_of_a_point(seed: int, friction: float, step: float) -> None:
     # Friction couples to the normal velocity of a corner beside the centre. With the rebound and its friction one after the other boxes
     # lost from 28 % less to 50 % more than in the exact regime. The box flies straight, so that arms are those of the impact, and the next
-    # corner lands in a later step. What is left are arms of float32.
+    # corner lands in a later step. What is left are arms of float32. In longer steps the next corner is known as well when the first lands:
+    # with friction at the mean of their heights the box left with 0.83 of its speed.
     material, size = ri.Material(restitution=0.47, static_friction=friction, dynamic_friction=friction), np.array([0.1, 0.15, 0.2])
     box = ri.Body(
         "box", ri.Shape.box(size), position=(0, 0, 0.5), orientation=on_a_corner(seed, size), velocity=(0.2, 0.1, -2.8), material=material
     )
     scene = ri.Scene((0, 0, 0), [ri.Body("floor", ri.Shape.half_space(), motion="static", material=material), box])
-    exact, soft = (ri.simulate(scene, 0.4, accuracy=ri.Accuracy(contact_solver=solver)) for solver in ("newton", "substepped"))
+    exact, soft = (ri.simulate(scene, 0.4, accuracy=ri.Accuracy(contact_solver=solver, step=step)) for solver in ("newton", "substepped"))
     frame = int(np.searchsorted(exact.times, exact.impacts["time"][0])) + 1
     assert np.count_nonzero(exact.impacts["time"] < exact.times[frame] + 1e-3) == 1
     assert soft.velocity("box")[frame] == pytest.approx(exact.velocity("box")[frame], abs=1e-6)

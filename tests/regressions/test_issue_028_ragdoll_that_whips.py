@@ -1,7 +1,7 @@
 """A ragdoll down a stair, at "preview": after an impact its arms whipped round, and sub-steps gained 0.17 % of what moved in a step.
 
-It was given back to exact contact until the end of the run, which took 11 s a second, where sub-steps take a fifth of a second. Such a step is
-made again now, more finely. With one try alone this run leaves the sub-steps at 0.63 s.
+It was given back to exact contact until the end of the run, which took 11 s a second, where sub-steps take a fifth of a second. Such a
+step is made again now, more finely. With one try alone this run leaves the sub-steps at 0.63 s.
 """
 
 from __future__ import annotations

@@ -11,9 +11,9 @@ G is what the contacts of jointed bodies feel of each other (Delassus matrix; th
 
     p_i <- projection of p_i - (u_i + s_i p_i) / (G_ii + s_i) on the bounds of row i, u <- u + G dp
 
-It cannot go round in circles between two sets of contacts that stick or slip, as Newton's method may. It comes to its end slowly, as Newton's
-method does not. So a few sweeps find who sticks, slips and parts, and Newton's method has little or nothing left to do. With sweeps over
-contacts and joints together chains need hundreds; with joints eliminated a ragdoll on a stair needs twenty.
+It cannot go round in circles between two sets of contacts that stick or slip, as Newton's method may. It comes to its end slowly, as
+Newton's method does not. So a few sweeps find who sticks, slips and parts, and Newton's method has little or nothing left to do. With
+sweeps over contacts and joints together chains need hundreds; with joints eliminated a ragdoll on a stair needs twenty.
 """
 
 from math import sqrt
@@ -23,7 +23,15 @@ import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.dynamics.constraints.rows import BOUNDED, DISC, DISC_SECOND, FREE, SEGMENT, multiply, multiply_transposed
-from rigidimpulse.dynamics.solvers.newton import REGULARISATION_FREE, TINY, Factored, assemble, prepare, velocities_from_impulses, row_weights
+from rigidimpulse.dynamics.solvers.newton import (
+    REGULARISATION_FREE,
+    TINY,
+    Factored,
+    assemble,
+    prepare,
+    row_weights,
+    velocities_from_impulses,
+)
 from rigidimpulse.dynamics.solvers.sparse_lu import factor, solve_factored
 
 MOST_ROWS, MOST_ROWS_A_BODY = 72, 4
@@ -91,8 +99,8 @@ def _eliminate(rows, n, place, m):
     matrix, column = np.empty((m, m)), np.empty((n, 6))
     for c in range(m):
         _column(rows, which[c], factored, column)
-        for d in range(m):
-            matrix[c, d] = _along(rows, which[d], column)
+        for d in range(c + 1):
+            matrix[c, d] = matrix[d, c] = _along(rows, which[d], column)
     return Reduced(which, place, matrix, slope, factored)
 
 

@@ -176,12 +176,24 @@ def factor(elimination, blocks, pivots):
 
 
 @jit
+def _has_value(x, body):
+    """Whether any entry of a body's row of x is not zero."""
+    for k in range(SIZE):
+        if x[body, k] != 0.0:
+            return True
+    return False
+
+
+@jit
 def solve_factored(elimination, blocks, pivots, x):
     """Solve for the vector x (n, 6) in place."""
     order, start, later, slot = elimination.order, elimination.start, elimination.later, elimination.slot
     n = order.shape[0]
     for k in range(n):
         body = order[k]
+        # A force on one body of a chain concerns only those that are eliminated after it.
+        if not _has_value(x, body):
+            continue
         _solve_vector(blocks, slot[body, body], pivots, x, body)
         for t in range(start[k], start[k + 1]):
             left, target = slot[later[t], body], later[t]
