@@ -12,8 +12,8 @@ from rigidimpulse.dynamics.solvers.reduced import MOST_ROWS_A_BODY, start_withou
 TARGET = 1e-9
 
 
-def chain_with_contacts(seed: int, bodies: int, contacts: int) -> Rows:
-    """A chain on ball joints, with contacts (normal, two of friction) with the world, moving at about 1 m/s."""
+def chain_with_contacts(seed: int, bodies: int, contacts: int, softness: float = 0.0) -> Rows:
+    """A chain on ball joints, hard or soft, with contacts (normal, two of friction) with the world, moving at about 1 m/s."""
     random = np.random.default_rng(seed)
     rows = make_rows(3 * (contacts + bodies - 1))
     rows.bias[:] = random.normal(size=len(rows.bias))
@@ -27,7 +27,7 @@ def chain_with_contacts(seed: int, bodies: int, contacts: int) -> Rows:
         rows.master[i + 1 : i + 3], rows.coefficient[i + 1 : i + 3] = i, 0.5
     for k in range(bodies - 1):
         i = 3 * (contacts + k)
-        rows.first[i : i + 3], rows.second[i : i + 3] = k, k + 1
+        rows.first[i : i + 3], rows.second[i : i + 3], rows.softness[i : i + 3] = k, k + 1, softness
         for side, sign in ((0, -1.0), (6, 1.0)):
             rows.jacobian[i : i + 3, side : side + 3] = sign * np.eye(3)
             rows.jacobian[i : i + 3, side + 3 : side + 6] = sign * np.cross(random.normal(size=3), np.eye(3))
@@ -42,11 +42,12 @@ def residual_and_velocities(rows: Rows, bodies: int) -> tuple[float, np.ndarray]
     return natural_residual(rows, u, rows.impulse, weight), y
 
 
+@pytest.mark.parametrize("softness", [0.0, 0.5])
 @pytest.mark.parametrize("seed", range(8))
-def test_the_start_is_near_the_answer_and_leads_to_it(seed: int) -> None:
+def test_the_start_is_near_the_answer_and_leads_to_it(seed: int, softness: float) -> None:
     """What is left is at most 1e-4 of what was; Newton's method comes from there to the velocities that it finds from nothing."""
     bodies, contacts = 8, 4
-    rows, cold = chain_with_contacts(seed, bodies, contacts), chain_with_contacts(seed, bodies, contacts)
+    rows, cold = (chain_with_contacts(seed, bodies, contacts, softness) for _ in range(2))
     before, _ = residual_and_velocities(rows, bodies)
     assert start_without_joints(rows, bodies, TARGET) >= 2
     after, _ = residual_and_velocities(rows, bodies)

@@ -1,9 +1,10 @@
 """A start for Newton's method where joints are: the rows of contacts, limits and drives alone, with the joints eliminated.
 
-Joints are FREE rows f, all others are rows c. From the present impulses p on, with the regularised law of FREE rows (see `newton`),
-dp_f = -R^-1 u_f with R = k diag(Jh Jh^T) + s, changes of the impulses of the others change y = Jh^T p and u by
+Joints are FREE rows f, all others are rows c, BOUNDED ones and those of a DISC. From present impulses p and velocities u on, the law of
+FREE rows, regularised as in `newton`, is  dp_f = -R^-1 (u_f + s p_f + du_f)  with R = k diag(Jh Jh^T) + s. So changes of the impulses of
+the others change y = Jh^T p and u by
 
-    A dy = Jh_c^T dp_c - Jh_f^T R^-1 u_f,      A = I + Jh_f^T R^-1 Jh_f
+    A dy = Jh_c^T dp_c - Jh_f^T R^-1 (u_f + s p_f),      A = I + Jh_f^T R^-1 Jh_f
     du_c = G dp_c + (what joints do by themselves),      G = Jh_c A^-1 Jh_c^T
 
 G is what the contacts of jointed bodies feel of each other (Delassus matrix; the inverse of the operational space inertia, Featherstone
@@ -22,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
-from rigidimpulse.dynamics.constraints.rows import BOUNDED, DISC, DISC_SECOND, FREE, SEGMENT, multiply, multiply_transposed
+from rigidimpulse.dynamics.constraints.rows import DISC, DISC_SECOND, FREE, multiply, multiply_transposed
 from rigidimpulse.dynamics.solvers.newton import (
     REGULARISATION_FREE,
     TINY,
@@ -54,7 +55,7 @@ class Reduced(NamedTuple):
 
 @jit_making_arrays
 def start_without_joints(rows, n, target):
-    """Bring the impulses of the rows of n movable bodies near the answer; none where it does not pay.
+    """Bring the impulses of the rows of n movable bodies near the answer, where it pays; rows are FREE, BOUNDED, or those of a DISC.
 
     target: residual that is asked for, m/s. Returns the number of sweeps.
     """
@@ -70,6 +71,9 @@ def start_without_joints(rows, n, target):
     y, u, change, p, line = np.empty((n, 6)), np.empty(count), np.empty(count), np.empty((2, m)), np.empty(m)
     for _ in range(ROUNDS):
         velocities_from_impulses(rows, rows.impulse, y, u)
+        for i in range(count):
+            if place[i] < 0:
+                u[i] += rows.softness[i] * rows.impulse[i]
         # What joints do by themselves.
         _follow(rows, reduced, u, change, y)
         for c in range(m):
@@ -133,7 +137,7 @@ def _along(rows, i, y):
 
 @jit
 def _follow(rows, reduced, u, change, y):
-    """Changes of velocities (r,) that the FREE rows make from velocities u (r,) on, where no other impulse changes."""
+    """Changes of velocities (r,) that the FREE rows make by themselves; u (r,): velocities, for FREE rows with s p."""
     for i in range(u.shape[0]):
         change[i] = -reduced.slope[i, 0] * u[i]
     _answer(rows, reduced, change, y)
@@ -149,7 +153,7 @@ def _answer(rows, reduced, change, y):
 
 @jit
 def _give(rows, reduced, u, change, y):
-    """Change the impulses of the rows: by change (r,) where they are reduced, and as joints follow from velocities u (r,) on."""
+    """Change the impulses of the rows: by change (r,) where they are reduced, and as joints follow; u as in `_follow`."""
     for i in range(u.shape[0]):
         if reduced.place[i] < 0:
             change[i] = -reduced.slope[i, 0] * u[i]
@@ -173,8 +177,8 @@ def _sweep(rows, reduced, u, p, enough):
             # The second row of a disc is done with its first.
             if kind == DISC_SECOND:
                 continue
-            bound = 0.0 if kind == BOUNDED else rows.coefficient[i] * max(p[place[rows.master[i]]], 0.0)
             if kind == DISC:
+                bound = rows.coefficient[i] * max(p[place[rows.master[i]]], 0.0)
                 # One divisor for both rows: the projection on a disc wants a step along their velocity.
                 divisor = max(matrix[c, c], matrix[c + 1, c + 1]) + max(rows.softness[i], rows.softness[i + 1]) + TINY
                 x = p[c] - (u[c] + rows.softness[i] * p[c]) / divisor
@@ -184,13 +188,7 @@ def _sweep(rows, reduced, u, p, enough):
                 worst = max(worst, _set(matrix, c, share * x, p, u), _set(matrix, c + 1, share * z, p, u))
                 continue
             x = p[c] - (u[c] + rows.softness[i] * p[c]) / (matrix[c, c] + rows.softness[i] + TINY)
-            if kind == BOUNDED:
-                x = min(max(x, rows.lower[i]), rows.upper[i])
-            elif kind == SEGMENT:
-                x = min(max(x, -bound), bound)
-            else:
-                x = rows.coefficient[i] * p[place[rows.master[i]]]
-            worst = max(worst, _set(matrix, c, x, p, u))
+            worst = max(worst, _set(matrix, c, min(max(x, rows.lower[i]), rows.upper[i]), p, u))
         if worst <= enough:
             break
     return number

@@ -505,7 +505,7 @@ class SubsteppedIslands:
     def _solved_together(self, run: Run, members: np.ndarray) -> list[np.ndarray]:
         """Members that are solved together: islands with joints one by one, all others at once."""
         joined = members[self._jointed[members]]
-        labels = np.unique(self.label[joined[[len(run.joints.at([i])) > 0 for i in joined.tolist()]]])
+        labels = np.unique(self.label[np.intersect1d(joined, run.joints.bodies_of(run.joints.at(joined)))])
         parts = [members[self.label[members] == label] for label in labels.tolist()]
         rest = members[~np.isin(self.label[members], labels)]
         return [rest, *parts] if len(rest) else parts
