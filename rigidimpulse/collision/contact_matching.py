@@ -67,6 +67,15 @@ def write_point(bodies, pairs, p, source, coefficients, points, r):
     ax, ay, az = real[c, 0] / factor_a - round_a * nx, real[c, 1] / factor_a - round_a * ny, real[c, 2] / factor_a - round_a * nz
     bx, by, bz = (real[c, 3] - dx) / factor_b, (real[c, 4] - dy) / factor_b, (real[c, 5] - dz) / factor_b
     bx, by, bz = bx + round_b * nx, by + round_b * ny, bz + round_b * nz
+    if factor_a != 1.0 or factor_b != 1.0:
+        # What meets a face lies over its own foot there. A foot on the shrunk face, over f, lies beside it by the part 1 / f - 1 of its
+        # distance from the centre: a ball that rolled along a plank sank into it by 3 mm, since its spin moved the wrong point.
+        along = nx * (dx + bx - ax) + ny * (dy + by - ay) + nz * (dz + bz - az)
+        moves_b = round_a > round_b if (round_a > 0.0) != (round_b > 0.0) else carrier
+        if moves_b:
+            bx, by, bz = ax + along * nx - dx, ay + along * ny - dy, az + along * nz - dz
+        else:
+            ax, ay, az = dx + bx - along * nx, dy + by - along * ny, dz + bz - along * nz
     m, t = material[a], material[b]
     for k in range(IMPULSE, POINT_FIELDS):
         points[r, k] = 0.0

@@ -1,9 +1,10 @@
 """Records of patches for the sub-stepped solver, a batch of W at once, and impulses back from them; see `records` for the fields.
 
 With unit normal n, from a to b, tangents t_1, t_2 (t_1 x t_2 = n), points c_a on a and c_b on b, and their gap n.(c_b - c_a), impulses
-act at one point s c_a + (1 - s) c_b, so that no torque is left over: mid-way (s = 1/2), or on the surface of what can move, so that it
-rolls. The centre O of a patch is the mean of these points, at the height where they press: the mean by their impulses of the last sub-step,
-or the point with the least gap where there were none. r_a and r_b are the arms to it. The points are taken to lie at O + x t_1 + y t_2.
+act at one point s c_a + (1 - s) c_b, so that no torque is left over: on the surface of what can move, so that it rolls; where both can, on
+the one that is rounded; else mid-way (s = 1/2). The centre O of a patch is the mean of these points, at the height where they press: the
+mean by their impulses of the last sub-step, or the point with the least gap where there were none. r_a and r_b are the arms to it. The
+points are taken to lie at O + x t_1 + y t_2.
 
 With M_i the inverse inertia of body i, K = (1 / m_a + 1 / m_b) 1 + sum of -[r_i] M_i [r_i] is how impulses at O change the relative
 velocity there, [r] x = r x x; a torque m turns the patch by M m, M = M_a + M_b. An impulse p n at (x, y) is p n at O and the torque
@@ -203,7 +204,8 @@ def fill(simd, batches, begin, number, places, mass, lines, soft):
         at = POINTS * k * w
         first, second = gather(simd, lines, batches.row, at), gather(simd, lines[ROW:], batches.row, at)
         ra, rb = _rotation(simd, pa), _rotation(simd, pb)
-        share = where_greater(ma[INVERSE_MASS], zero, where_greater(mb[INVERSE_MASS], zero, half, one), zero)
+        on_round = where_greater(first[ROUND_A], zero, one, zero) - where_greater(first[ROUND_B], zero, one, zero)
+        share = where_greater(ma[INVERSE_MASS], zero, where_greater(mb[INVERSE_MASS], zero, fma(half, on_round, half), one), zero)
         between = less(linear(pb), linear(pa))
         skeleton_a = _turned(ra, (first[SKELETON_A], first[SKELETON_A + 1], first[SKELETON_A + 2]))
         skeleton_b = add(between, _turned(rb, (second[SKELETON_B - ROW], second[SKELETON_B + 1 - ROW], second[SKELETON_B + 2 - ROW])))

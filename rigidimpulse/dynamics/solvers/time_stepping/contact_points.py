@@ -13,6 +13,8 @@ from rigidimpulse.collision.contact_records import (
     DYNAMIC_FRICTION,
     FRICTION,
     IMPULSE,
+    ROUND_A,
+    ROUND_B,
     SEPARATION,
     SKELETON_B,
     SKIN,
@@ -28,8 +30,8 @@ from rigidimpulse.model.contacts import Contacts
 AHEAD, NEAR = 2.0, 1.0
 GIVEN = 21
 """Fields of a contact point: the impulse on the second body since the caller set it to 0 (3), N s, world."""
-MIDDLE = 0.5
-"""Share of the first body in the place of an impulse: midway between both surfaces."""
+FIRST, MIDDLE, SECOND = 1.0, 0.5, 0.0
+"""Share of the first body in the place of an impulse: on a rounded surface that meets one with edges, else midway between both."""
 
 
 @jit_making_arrays
@@ -52,7 +54,7 @@ def contact_points(bodies, now, pairs, points, coefficients, h):
         law = coefficients[bodies.material[a], bodies.material[b]]
         for r in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
             n = normal_of(bodies.position, bodies.rotation, points, r, a, b, pairs.carrier[p])
-            x, y, z, gap = point_of(bodies.position, bodies.rotation, points, r, (a, b), n, MIDDLE)
+            x, y, z, gap = point_of(bodies.position, bodies.rotation, points, r, (a, b), n, _share(points, r))
             for k, along in enumerate((x, y, z)):
                 arms[0, m, k] = along
                 arms[1, m, k] = along - (bodies.position[b, k] - bodies.position[a, k])
@@ -71,6 +73,16 @@ def contact_points(bodies, now, pairs, points, coefficients, h):
         numbers[4, :m],
     )  # fmt: skip
     return contacts, place[:m]
+
+
+@jit
+def _share(points, r):
+    """Share of the first body in the place of an impulse: what rolls is pressed where it touches now, not where it did at the last look."""
+    if points[r, ROUND_A] > 0.0 and points[r, ROUND_B] == 0.0:
+        return FIRST
+    if points[r, ROUND_B] > 0.0 and points[r, ROUND_A] == 0.0:
+        return SECOND
+    return MIDDLE
 
 
 @jit
