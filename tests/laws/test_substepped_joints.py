@@ -154,11 +154,11 @@ def test_limits_hold_and_joints_let_go() -> None:
     assert run.status.ok and [event.kind for event in run.status.events] == ["joint let go"]
 
 
-@pytest.mark.parametrize(("links", "down"), [(7, False), (8, True), (14, True)])
+@pytest.mark.parametrize(("links", "down"), [(4, False), (7, True), (14, True)])
 def test_a_chain_that_lands_is_stepped_where_it_is_expensive(links: int, down: bool) -> None:
-    """At "standard" 8 links and more go to sub-steps; what is left of their energy is the same within 2 %, their places within 5 mm.
+    """At "standard" 5 links and more go to sub-steps; what is left of their energy is the same within 2 %, their places within 5 mm.
 
-    With the limit of small mechanisms, 48 solves a step, all three stay exact.
+    With a limit of 48 solves a step all three stay exact.
     """
     scene = ri.Scene(bodies=[ri.Body("floor", ri.Shape.half_space(), motion="static")])
     for k in range(links):
@@ -178,7 +178,7 @@ def test_a_chain_that_lands_is_stepped_where_it_is_expensive(links: int, down: b
 @pytest.mark.parametrize("preset", ["substepped", "preview"])
 @pytest.mark.parametrize("thickness", [0.01, 0.05])
 def test_a_ball_rolls_along_a_plank_that_joints_hold(thickness: float, preset: str) -> None:
-    """It keeps its height to the skin and its speed to 1e-9, 30 cm from the middle of the plank as over the middle.
+    """It keeps its height to the skin and its speed to 1e-6, 30 cm from the middle of the plank as over the middle.
 
     With the foot of the ball on the plank shrunk by 1 %, it lay 3 mm aside, and the spin of 30 rad/s moved it: the ball sank in by 1 cm.
     """
@@ -192,4 +192,4 @@ def test_a_ball_rolls_along_a_plank_that_joints_hold(thickness: float, preset: s
     run = ri.simulate(scene, 0.7, accuracy=accuracy)
     assert run.status.ok and stepped(run)
     np.testing.assert_allclose(run.position("ball")[:, 2], height, atol=0.008 * 0.5 * thickness + 1e-9)
-    np.testing.assert_allclose(run.velocity("ball")[-1], (0.75, 0.0, 0.0), atol=1e-9)
+    np.testing.assert_allclose(run.velocity("ball")[-1], (0.75, 0.0, 0.0), atol=1e-6)
