@@ -47,7 +47,7 @@ MANY, SOME, FEW, KEPT = 60, 12, 8, 2
 ASK = -1.0
 """`SolveCounts.most` where it is asked at every step whether islands begin to be sub-stepped."""
 EXPENSIVE_SOLVES, EXPENSIVE_TALL = 6.0, 16.0
-EXPENSIVE_JOINTED, EXPENSIVE_SWING, SMALL = 8.0, 300.0, 8.0
+EXPENSIVE_JOINTED, EXPENSIVE_SWING, SMALL = 16.0, 300.0, 8.0
 RATIO, REBOUND, ELASTIC, TALL = 30.0, 0.5, 0.9, 12
 CROWD, PAIRS = 128, 4.0
 FAST, SPIN = 0.5, 2.5 / 16.0
