@@ -258,6 +258,21 @@ def test_a_kick_is_momentum_that_is_not_kept(what: str, kick: tuple[float, float
     assert "joint" not in fault.message
 
 
+@pytest.mark.parametrize("is_driven", [False, True])
+def test_a_kick_to_a_chain_names_a_remedy_that_there_is(is_driven: bool) -> None:
+    """Limits are for joints with motors; of others they change nothing."""
+    scene = ri.Scene(gravity=(0, 0, 0))
+    for k, name in enumerate("ab"):
+        scene.add(ri.Body(name, ri.Shape.box((0.2, 0.1, 0.1)), position=(0.25 * k, 0, 0)))
+    motor = ri.Motor(1.0, damping=0.01) if is_driven else None
+    scene.add(ri.HingeJoint("a", "b", (0.125, 0, 0), (0, 1, 0), motor=motor))
+    run = ri.simulate(scene, 0.5)
+    velocity = run.velocities.copy()
+    velocity[25:, run.index("b"), 0] += 1e-3
+    fault = next(fault for fault in measured_faults(recorded(run, velocity=velocity)) if fault.kind == "momentum not kept")
+    assert ("motors" in fault.message) == is_driven and ("smaller step" in fault.message) != is_driven
+
+
 @pytest.mark.parametrize("make", [falling_boxes, sub_stepped_pile], ids=lambda make: make.__name__)
 def test_a_body_moved_into_another_is_inside_it(make) -> None:
     """For one of the frames that are looked at, box 1 stands 38 % of its size inside box 0, face to face."""
