@@ -2,7 +2,9 @@
 
 The mesh contact routines need a gap above 0, and soft contacts sink in. A convex shape around its centre of mass is therefore shrunk
 about that centre by the factor f = 1 - SHRINK. With h the distance of a face from the centre, the face moves inwards by SHRINK h, and
-normals stay the same. A point p of the shrunk shape belongs to the point p / f of the true one.
+normals stay the same. A corner p of the shrunk shape belongs to the corner p / f of the true one. The foot on a face of what touches it
+does not: it is found again on the true face, see `contact_matching.write_point`. An edge far from the centre is met too early, by
+1 - f of its distance from it.
 """
 
 from __future__ import annotations

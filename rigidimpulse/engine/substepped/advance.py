@@ -545,13 +545,11 @@ class SubsteppedIslands:
         if self._joint_stepper is None:
             prepare_kernels(self._world, with_events=False, with_substepped=True)
             self._joint_stepper = JointedStepper(run, self.stepper)
-        out = None
         for finer in FINER:
             self._set_up(run, members, span[0], span[1] - span[0], kept, self._joint_stepper.fineness(run, members, finer))
-            out = self._joint_stepper.step(run, *span)
-            if out is not None:
-                break
-        return out
+            if (out := self._joint_stepper.step(run, *span)) is not None:
+                return out
+        return None
 
     def _take_in(self, run: Run, fresh: np.ndarray, time: float) -> None:
         """What exact contact did to bodies ends where they come to a sub-stepped island."""
