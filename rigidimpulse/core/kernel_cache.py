@@ -41,8 +41,8 @@ _KEPT = 4
 """Folders of a module that are kept for a Python and a processor: one for each of its latest states."""
 _INDEX, _KERNEL = ".nbi", ".nbc"
 """Suffixes of numba's files: which kernels there are of a function, and a kernel."""
-OF_A_PROCESS = (".lock", ".begun")
-"""Suffixes of files that say what processes do just now."""
+CLAIM = ".lock"
+"""Suffix of the files that processes lock while they compile."""
 _configuration = threading.Lock()
 # Before the first kernel: numba asks but once what to compile for.
 compile_for_ready_kernels()
@@ -117,7 +117,7 @@ def _read_only_folders(path: Path, chosen: str) -> Iterator[Path]:
 
 def _is_note(file: Path) -> bool:
     """Whether a file was made by `note_beside`, for good."""
-    return file.is_file() and file.suffix not in (_INDEX, _KERNEL, *OF_A_PROCESS)
+    return file.is_file() and file.suffix not in (_INDEX, _KERNEL, CLAIM)
 
 
 def _compiled(folder: Path, path: Path, function: Callable[..., Any]) -> list[Path]:

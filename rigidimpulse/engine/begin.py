@@ -97,7 +97,7 @@ def bind_compiled_loop(run: Run) -> None:
     compiled = CompiledLoop(run)
     if compiled.is_compiled():
         run.compiled = compiled
-    elif compiled.begin_compiling():
+    else:
         compile_loop_in_background()
 
 

@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from rigidimpulse.core.claim import claim
-from rigidimpulse.core.kernel_cache import is_kept, note_beside, source_digest, variables_to_share_kernels
+from rigidimpulse.core.kernel_cache import CLAIM, is_kept, note_beside, source_digest, variables_to_share_kernels
 from rigidimpulse.core.kernels import Kernel, number_of_cores
 from rigidimpulse.model.world import World
 
@@ -86,7 +86,7 @@ class KernelPart:
     def claim(self) -> IO[bytes] | None:
         """Claim it, to compile it; None where another process compiles it."""
         note = self.note()
-        return claim(note.with_name(f"{note.name}.lock"))
+        return claim(note.with_name(f"{note.name}{CLAIM}"))
 
 
 def prepare_kernels(world: World, with_events: bool, with_substepped: bool) -> None:
@@ -109,7 +109,7 @@ def _alone(seconds: float) -> Iterator[None]:
     held, begin, said = None, time.monotonic(), False
     # Where no file can be made, each process compiles for itself.
     with suppress(OSError):
-        path = note_beside(prepare_kernels, "kinds.lock")
+        path = note_beside(prepare_kernels, f"kinds{CLAIM}")
         while (held := claim(path)) is None and time.monotonic() - begin < LONGEST_WAIT * seconds:
             if not said:
                 logger.warning("another process compiles kernels for the first run on this machine: waiting for it")
@@ -159,9 +159,12 @@ def compile_kernels(kinds: list[str]) -> None:
 
 
 def compile_loop_in_background() -> None:
-    """Start a process that compiles the order of events, unless one does; it goes on by itself."""
+    """Start a process that compiles the order of events, unless one does, or no folder would keep it; it goes on by itself.
+
+    Each process starts one at most, so that a compiler that fails is not asked again by every run. What was stopped, its next one starts.
+    """
     part = KernelPart(LOOP)
-    if (held := part.claim()) is not None:
+    if not _BACKGROUND and is_kept() and (held := part.claim()) is not None:
         # The process takes the claim itself: this one may end before.
         held.close()
         _BACKGROUND.append(start_process([part]))

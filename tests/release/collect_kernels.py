@@ -14,7 +14,7 @@ from typing import Any
 
 import numba
 
-from rigidimpulse.core.kernel_cache import OF_A_PROCESS, kernel_folder
+from rigidimpulse.core.kernel_cache import CLAIM, kernel_folder
 from rigidimpulse.core.kernel_places import PACKAGE
 from rigidimpulse.core.ready_kernels import ABOUT, Fit
 
@@ -24,7 +24,7 @@ def main(target: Path) -> None:
     config: Any = vars(numba)["config"]
     for module in sorted(PACKAGE.rglob("*.py")):
         folder = kernel_folder(module, config.CACHE_DIR)
-        files = [file for file in folder.rglob("*") if file.is_file() and file.suffix not in OF_A_PROCESS]
+        files = [file for file in folder.rglob("*") if file.is_file() and file.suffix != CLAIM]
         place = target / module.relative_to(PACKAGE).with_suffix("") / folder.name
         for file in files:
             place.mkdir(parents=True, exist_ok=True)

@@ -112,6 +112,31 @@ def test_a_process_that_hangs_is_not_waited_for_without_end(empty_cache):
     assert failed.startswith("contacts 7: IndexError")
 
 
+IN_BACKGROUND = """
+from rigidimpulse.engine.warm_up import compile_loop_in_background
+compile_loop_in_background()
+compile_loop_in_background()
+input()
+"""
+
+
+def test_what_is_killed_in_the_background_the_next_process_begins_again(empty_cache):
+    """A note of the killed one said for ten minutes that it compiled, and runs went on without the kernel, ten times slower."""
+    for _ in range(2):
+        with subprocess.Popen([sys.executable, "-c", IN_BACKGROUND], stdin=subprocess.PIPE) as first:
+            deadline, children = time.monotonic() + 60.0, []
+            while not children and time.monotonic() < deadline:
+                time.sleep(0.1)
+                children = processes_below(first.pid)
+            (child,) = children
+            while (held := KernelPart("order of events").claim()) is not None and time.monotonic() < deadline:
+                held.close()
+                time.sleep(0.1)
+            os.kill(child, signal.SIGKILL)
+            first.kill()
+        assert held is None
+
+
 def test_what_another_process_has_compiled_is_left_out(empty_cache):
     """Were it compiled, it would fail."""
     part = KernelPart("contacts", 7)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from time import perf_counter, time
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from rigidimpulse.collision.manifold.dispatch import SCRATCH_ROWS
 from rigidimpulse.collision.manifold.kept_features import FEW_ROWS, make_contact_scratch
 from rigidimpulse.collision.time_of_impact.bisection import LOOK_AHEAD
-from rigidimpulse.core.kernel_cache import is_kept, note_beside
+from rigidimpulse.core.kernel_cache import note_beside
 from rigidimpulse.core.memory import rows_of
 from rigidimpulse.core.record import Record
 from rigidimpulse.dynamics.constraints.joint_impact import NO_JOINTS
@@ -59,8 +59,6 @@ if TYPE_CHECKING:
 
 NONE = np.zeros(0, np.int64)
 FIRST_REPORTS = 256
-PATIENCE = 600.0
-"""s, after which a process that said it would compile the kernel is not waited for any more."""
 COMPILED: set[str] = set()
 """Layouts of records for which this process has found the kernel compiled."""
 EFFECTS = {
@@ -147,22 +145,12 @@ class CompiledLoop:
             COMPILED.add(layout)
         return layout in COMPILED
 
-    def begin_compiling(self) -> bool:
-        """Say that the kernel is being compiled; returns False if somebody has said so a short while ago, or if no cache would keep it."""
-        if not is_kept():
-            return False
-        begun = self._note(".begun")
-        if begun.exists() and time() - begun.stat().st_mtime < PATIENCE:
-            return False
-        begun.touch()
-        return True
-
     def say_compiled(self) -> None:
         """Say that the kernel is in the cache."""
         self._note().touch()
 
-    def _note(self, ending: str = "") -> Path:
-        return note_beside(run_events.py_func, f"{self._record.layout_name}{ending}")
+    def _note(self) -> Path:
+        return note_beside(run_events.py_func, self._record.layout_name)
 
     def advance(self, run: Run, pair_events: PairEvents, event: tuple[float, np.ndarray], until: float) -> tuple[float, np.ndarray]:
         """Go on from an event, its time [s] and bodies, to the end of the step, or to an event for the loop in Python.
