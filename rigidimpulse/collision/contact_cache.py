@@ -370,7 +370,7 @@ def _find_of_parts(convex, bodies, table, p, share, query, coefficients, workspa
     if pairs.count[p] == 0:
         pairs.contact_margin[p] = min(bodies.skin[ends[0]], bodies.skin[ends[1]])
     for i in range(count):
-        write_point(bodies, pairs, p, Source(parts.real, i, 0.0, 0.0, 1.0, 1.0), coefficients, points, new + i)
+        write_point(bodies, pairs, p, Source(parts.real, i, 0.0, 0.0), coefficients, points, new + i)
         for j in range(3):
             ids[new + i, j] = parts.integer[i, 2 + j]
     if pairs.count[p] == 0:
@@ -428,7 +428,7 @@ def find_contacts(convex, bodies, table, share, limits, coefficients, workspace)
         if pairs.count[p] == 0:
             pairs.contact_margin[p] = min(bodies.skin[a], bodies.skin[b])
         for i in range(count):
-            write_point(bodies, pairs, p, Source(found.real, i, 0.0, 0.0, 1.0, 1.0), coefficients, points, start + i)
+            write_point(bodies, pairs, p, Source(found.real, i, 0.0, 0.0), coefficients, points, start + i)
             for j in range(3):
                 ids[start + i, j] = found.ids[i, j]
         if pairs.count[p] == 0:

@@ -36,14 +36,12 @@ LEAST_MARGIN = 0.2
 
 
 class Source(NamedTuple):
-    """A contact as it was found, relative to the first body, for shapes that may be smaller than the true ones."""
+    """A contact as it was found, relative to the first body."""
 
     real: np.ndarray  # (k, 10) on a, on b, normal, gap
     place: int  # of the contact in it
     round_a: float  # m, radius of the rounded surface of a at the contact
     round_b: float
-    factor_a: float  # lengths of the shape, as a part of the true ones
-    factor_b: float
 
 
 class Points(NamedTuple):
@@ -58,24 +56,14 @@ class Points(NamedTuple):
 @inlined
 def write_point(bodies, pairs, p, source, coefficients, points, r):
     """Write point r of pair p, without impulse; returns its separation. coefficients (k, k, 4): of two materials."""
-    real, c, round_a, round_b, factor_a, factor_b = source
+    real, c, round_a, round_b = source
     position, rotation, material, skin = bodies.position, bodies.rotation, bodies.material, bodies.skin
     a, b, carrier, contact_margin = pairs.first[p], pairs.second[p], pairs.carrier[p], pairs.contact_margin[p]
     nx, ny, nz = real[c, 6], real[c, 7], real[c, 8]
     dx, dy, dz = position[b, 0] - position[a, 0], position[b, 1] - position[a, 1], position[b, 2] - position[a, 2]
-    # Points of the shrunk shapes belong to p / f of the true ones; rounded surfaces keep their skeleton's point.
-    ax, ay, az = real[c, 0] / factor_a - round_a * nx, real[c, 1] / factor_a - round_a * ny, real[c, 2] / factor_a - round_a * nz
-    bx, by, bz = (real[c, 3] - dx) / factor_b, (real[c, 4] - dy) / factor_b, (real[c, 5] - dz) / factor_b
-    bx, by, bz = bx + round_b * nx, by + round_b * ny, bz + round_b * nz
-    if factor_a != 1.0 or factor_b != 1.0:
-        # What meets a face lies over its own foot there. A foot on the shrunk face, over f, lies beside it by the part 1 / f - 1 of its
-        # distance from the centre: a ball that rolled along a plank sank into it by 3 mm, since its spin moved the wrong point.
-        along = nx * (dx + bx - ax) + ny * (dy + by - ay) + nz * (dz + bz - az)
-        moves_b = round_a > round_b if (round_a > 0.0) != (round_b > 0.0) else carrier
-        if moves_b:
-            bx, by, bz = ax + along * nx - dx, ay + along * ny - dy, az + along * nz - dz
-        else:
-            ax, ay, az = dx + bx - along * nx, dy + by - along * ny, dz + bz - along * nz
+    # Rounded surfaces keep their skeleton's point.
+    ax, ay, az = real[c, 0] - round_a * nx, real[c, 1] - round_a * ny, real[c, 2] - round_a * nz
+    bx, by, bz = real[c, 3] - dx + round_b * nx, real[c, 4] - dy + round_b * ny, real[c, 5] - dz + round_b * nz
     m, t = material[a], material[b]
     for k in range(IMPULSE, POINT_FIELDS):
         points[r, k] = 0.0

@@ -1,8 +1,7 @@
 """Contacts of general pairs: those for which the contact cache has no kernel of its own.
 
-The kernels of `manifold.dispatch` need bodies that are apart, and soft contacts sink in. So the search is done with smaller shapes. Convex
-bodies are shrunk about their centre of mass by the factor SHRINK: normals stay the same, and points are put back on the true body. Other
-bodies that move have an inset surface (`manifold.inset_surface`). If even these shapes overlap, a pair keeps the contacts it had before.
+The kernels of `manifold.dispatch` need bodies that are apart, and soft contacts sink in. So the search is done with smaller shapes, and
+what it finds is put back on the true ones (`manifold.smaller_shapes`). If even these overlap, a pair keeps the contacts it had before.
 """
 
 from __future__ import annotations
@@ -14,14 +13,13 @@ import numpy as np
 from rigidimpulse.collision.contact_cache import note_seen
 from rigidimpulse.collision.contact_matching import NEAR, Points, Source, match_contacts, set_contact_margin, write_point
 from rigidimpulse.collision.contact_records import ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, SKIN
-from rigidimpulse.collision.geometry import Geometry
 from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
-from rigidimpulse.collision.manifold.inset_surface import put_back
-from rigidimpulse.collision.manifold.penetrating import gap_along, overlap_contacts, support
+from rigidimpulse.collision.manifold.penetrating import gap_along, overlap_contacts
 from rigidimpulse.collision.manifold.polyhedra import POINTS, Polyhedra, make_scratch
 from rigidimpulse.collision.manifold.polyhedra import Points as Found
 from rigidimpulse.collision.manifold.reduce import GAP_WEIGHT, PER_NORMAL, reduce_contacts
 from rigidimpulse.collision.manifold.rounding import only_primitive, side_radius
+from rigidimpulse.collision.manifold.smaller_shapes import put_back
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.vector import turned_by
 
@@ -33,15 +31,10 @@ FARTHEST = 2.5
 """The same of the gap of meshes."""
 
 
-class SmallerShapes(NamedTuple):
-    """The true shapes of the n bodies, by rank, and the smaller ones for the search."""
+class Deep(NamedTuple):
+    """Contacts of convex bodies that are deeper inside each other than the smaller shapes allow."""
 
-    true: Geometry
-    geometry: Geometry  # shrunk convex shapes, inset surfaces
-    factor: np.ndarray  # (n,) lengths of a shrunk shape, as a part of the true ones; 1 for others
-    back: np.ndarray  # (V, 4) and
-    depth: np.ndarray  # (n,) m, of the inset surface; see `inset_surface`
-    convex: np.ndarray  # (n,) bool, bodies whose contacts inside each other `solids` give
+    convex: np.ndarray  # (n,) bool, by rank: bodies in `solids`
     solids: Polyhedra  # see `penetrating`
 
 
@@ -54,41 +47,43 @@ class Searched(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """What `manifold.dispatch` is asked about the k pairs, and where their bodies, of the n of the scene, are."""
+    """What `manifold.dispatch` is asked about the k pairs, and where the n bodies are: with smaller shapes, then with their own."""
 
     a: np.ndarray  # (k,)
     b: np.ndarray  # (k,)
-    shown: np.ndarray  # (k,) m, distance of the search, between the smaller shapes
+    shown: np.ndarray  # (k,) m, distance of the search, between the shapes that are asked about
     far: np.ndarray  # (k,) m, the same between the true ones
-    position: np.ndarray  # (n, 3) m
-    orientation: np.ndarray  # (n, 4)
-    rotation: np.ndarray  # (n, 3, 3)
+    position: np.ndarray  # (2 n, 3) m
+    orientation: np.ndarray  # (2 n, 4)
+    rotation: np.ndarray  # (2 n, 3, 3)
     is_apart: np.ndarray  # (k,) bool, there is no contact, see `mark_apart`
 
 
 def make_asked(pairs: int, number: int) -> Asked:
     """Space for questions about `pairs` pairs of `number` bodies."""
     a, b, shown, far = np.zeros(pairs, np.int64), np.zeros(pairs, np.int64), np.zeros(pairs), np.zeros(pairs)
-    poses = np.zeros((number, 3)), np.zeros((number, 4)), np.zeros((number, 3, 3))
+    poses = np.zeros((2 * number, 3)), np.zeros((2 * number, 4)), np.zeros((2 * number, 3, 3))
     return Asked(a, b, shown, far, *poses, np.zeros(pairs, bool))
 
 
 @jit
-def ask_general(smaller, taken_off, bodies, pairs, places, margins, order, asked):
+def ask_general(smaller, bodies, pairs, places, margins, order, asked):
     """Write what is asked about the pairs at `places` (k,), whose contacts are wanted within margins (k,) m.
 
-    taken_off (n,): m, by which the surface of a smaller shape is inside the true one at most; order (n,): indices of the scene by rank.
+    order (n,): indices of the scene by rank.
     """
-    depth, position, orientation, rotation = smaller.depth, bodies.position, bodies.orientation, bodies.rotation
+    depth, position, orientation, rotation, n = smaller.depth, bodies.position, bodies.orientation, bodies.rotation, order.shape[0]
     for k in range(places.shape[0]):
         first, second = pairs.first[places[k]], pairs.second[places[k]]
         # A wide margin is expensive for meshes.
         far = margins[k] if depth[first] + depth[second] > 0.0 else FARTHER * margins[k]
-        asked.a[k], asked.b[k], asked.far[k] = order[first], order[second], far
-        asked.shown[k] = far + taken_off[first] + taken_off[second]
+        whole_first = smaller.polyhedron[first] and smaller.takes_up[second]
+        whole_second = smaller.polyhedron[second] and smaller.takes_up[first]
+        asked.a[k], asked.b[k] = order[first] + (n if whole_first else 0), order[second] + (n if whole_second else 0)
+        asked.far[k] = far
+        asked.shown[k] = far + (0.0 if whole_first else smaller.taken_off[first]) + (0.0 if whole_second else smaller.taken_off[second])
         # In the middle of a step bodies are elsewhere than at its start.
-        for i in (first, second):
-            at = order[i]
+        for i, at in ((first, asked.a[k]), (second, asked.b[k])):
             for j in range(3):
                 asked.position[at, j] = position[i, j]
                 for c in range(3):
@@ -98,7 +93,7 @@ def ask_general(smaller, taken_off, bodies, pairs, places, margins, order, asked
 
 
 @jit_making_arrays
-def mark_apart(smaller, shape_of_body, bodies, asked, pairs, places, span):
+def mark_apart(smaller, bodies, asked, pairs, places, span):
     """Mark the pairs of meshes at `places` that have had no contacts and are too far apart for any, and note how far: they need no search.
 
     A search for contacts is expensive for meshes, their gap is less so, and tells for how long there are none. asked: `Asked`, of these
@@ -111,8 +106,8 @@ def mark_apart(smaller, shape_of_body, bodies, asked, pairs, places, span):
         if pairs.count[p] > 0 or smaller.depth[pairs.first[p]] + smaller.depth[pairs.second[p]] == 0.0:
             continue
         a, b, taken_off = asked.a[k], asked.b[k], asked.shown[k] - asked.far[k]
-        posed_a = Posed(shape_of_body[a], asked.position[a], asked.rotation[a])
-        posed_b = Posed(shape_of_body[b], asked.position[b], asked.rotation[b])
+        posed_a = Posed(smaller.of_body[a], asked.position[a], asked.rotation[a])
+        posed_b = Posed(smaller.of_body[b], asked.position[b], asked.rotation[b])
         gap = pair_gap(smaller.geometry, posed_a, posed_b, FARTHEST * asked.shown[k], out)
         if gap > asked.shown[k]:
             is_apart[k], pairs.apart[p] = True, gap - taken_off
@@ -149,56 +144,47 @@ def _contradicts(bodies, pairs, p, points, new, new_end):
 
 
 @jit
-def _is_sound(smaller, bodies, a, b, real, first, last):
-    """Whether the shrunk bodies are apart along the normal of one of their contacts."""
+def _is_sound(smaller, bodies, a, b, found, first, last):
+    """Whether the bodies that were asked about are apart along the normal of one of their contacts."""
+    real, integer = found
     for s in range(first, last):
-        gap = gap_along(smaller.true, bodies, a, b, real[s, 6:9])
-        if gap + _shrunk_by(smaller, bodies, a, b, real[s, 6:9]) > 0.0:
+        shapes = (smaller.of_body[integer[s, 0]], smaller.of_body[integer[s, 1]])
+        if gap_along(smaller.geometry, bodies, a, b, shapes, real[s, 6:9]) > 0.0:
             return True
     return False
 
 
-@jit
-def _shrunk_by(smaller, bodies, a, b, n):
-    """How much wider the gap along n is between the shrunk bodies, m."""
-    geometry, factor, x, y = smaller.true, smaller.factor, bodies.position[a], bodies.position[b]
-    p, q = geometry.shape_first[bodies.shape[a]], geometry.shape_first[bodies.shape[b]]
-    reach_a = support(geometry, p, x, bodies.rotation[a], n, 1.0) - (n[0] * x[0] + n[1] * x[1] + n[2] * x[2])
-    reach_b = support(geometry, q, y, bodies.rotation[b], n, -1.0) + (n[0] * y[0] + n[1] * y[1] + n[2] * y[2])
-    return (1.0 - factor[a]) * reach_a + (1.0 - factor[b]) * reach_b
-
-
 @jit_making_arrays
 def _write(geometry, bodies, pairs, p, contact, coefficients, points, r):
-    """Write point r of pair p from a contact in the world, (real, place, factor of a, factor of b); returns its separation."""
-    real, c, factor_a, factor_b = contact
+    """Write point r of pair p from a contact in the world, (real, place); returns its separation."""
+    real, c = contact
     a, b = pairs.first[p], pairs.second[p]
     round_a = side_radius(geometry, only_primitive(geometry, bodies.shape[a]), bodies.rotation[a], real[c, 6:9])
     round_b = side_radius(geometry, only_primitive(geometry, bodies.shape[b]), bodies.rotation[b], real[c, 6:9])
     for k in range(3):
         real[c, k] -= bodies.position[a, k]
         real[c, 3 + k] -= bodies.position[a, k]
-    return write_point(bodies, pairs, p, Source(real, c, round_a, round_b, factor_a, factor_b), coefficients, points, r)
+    return write_point(bodies, pairs, p, Source(real, c, round_a, round_b), coefficients, points, r)
 
 
 @jit_making_arrays
-def store_contacts(smaller, bodies, table, searched, found, count, order, coefficients):
+def store_contacts(shapes, bodies, table, searched, found, count, order, coefficients):
     """Store the contacts found for the pairs `searched` in the points that are free for share 0, with the impulses of those they replace.
 
-    smaller: `SmallerShapes`; table: `contact_table.Table`; found: (real, integer) of `count` contacts in the order of the pairs, with
-    `integer[:, :2]` by indices of the scene; order (n,): indices by rank; coefficients (k, k, 4) of two materials.
+    shapes: (`SmallerShapes`, `Deep`); table: `contact_table.Table`; found: (real, integer) of `count` contacts in the order of the pairs,
+    with `integer[:, :2]` as in `Asked`; order (n,): indices by rank; coefficients (k, k, 4) of two materials.
     """
-    geometry, factor, convex = smaller.true, smaller.factor, smaller.convex
+    smaller, (convex, solids) = shapes
     pairs, points, ids, free = table
     real, integer = found
-    c, used = np.int64(0), free[0, 0]
+    c, used, n = np.int64(0), free[0, 0], order.shape[0]
     deep, deep_ids = np.empty((POINTS + 1, 10)), np.empty((POINTS + 1, 3), np.int64)
     scratch = make_scratch()
     for k in range(searched.places.shape[0]):
         p = searched.places[k]
         a, b = pairs.first[p], pairs.second[p]
         first = c
-        while c < count and integer[c, 0] == order[a] and integer[c, 1] == order[b]:
+        while c < count and integer[c, 0] % n == order[a] and integer[c, 1] % n == order[b]:
             put_back(smaller, bodies, a, b, real, integer, c)
             c += 1
         last = reduce_contacts(real, integer, first, c, PER_NORMAL, GAP_WEIGHT)
@@ -207,17 +193,14 @@ def store_contacts(smaller, bodies, table, searched, found, count, order, coeffi
         if pairs.count[p] == 0:
             pairs.contact_margin[p] = min(bodies.skin[a], bodies.skin[b])
         deep_count = 0
-        # Bodies deeper inside each other than the shrunk shapes allow: contacts from the true ones.
-        if convex[a] and convex[b] and factor[a] * factor[b] < 1.0 and not _is_sound(smaller, bodies, a, b, real, first, last):
-            deep_count = overlap_contacts(smaller.solids, bodies, a, b, size, scratch, Found(deep, deep_ids))
+        # Bodies deeper inside each other than the smaller shapes allow: contacts from the true ones.
+        if convex[a] and convex[b] and not _is_sound(smaller, bodies, a, b, found, first, last):
+            deep_count = overlap_contacts(solids, bodies, a, b, size, scratch, Found(deep, deep_ids))
         for s in range(deep_count if deep_count > 0 else last - first):
-            if deep_count > 0:
-                separation = _write(geometry, bodies, pairs, p, (deep, s, 1.0, 1.0), coefficients, points, used)
-                ids[used] = deep_ids[s]
-            else:
-                contact = (real, first + s, factor[a], factor[b])
-                separation = _write(geometry, bodies, pairs, p, contact, coefficients, points, used)
-                ids[used] = integer[first + s, 2:]
+            contact = (deep, s) if deep_count > 0 else (real, first + s)
+            separation = _write(smaller.geometry, bodies, pairs, p, contact, coefficients, points, used)
+            for j in range(3):
+                ids[used, j] = deep_ids[s, j] if deep_count > 0 else integer[first + s, 2 + j]
             # Each point is written before it is known to be kept; the next one then takes its place.
             if separation <= searched.margins[k]:
                 used += 1

@@ -110,6 +110,14 @@ class Geometry(NamedTuple):
     node_cone: np.ndarray  # (N, 11) of the normals with which it can touch, see `normal_cones.node_cones`
 
 
+_COUNTED = {
+    "shape_first": "kind", "vertex_first": "vertex", "triangle_first": "triangle", "edge_first": "edge", "node_first": "node_child",
+    "vertex_edge_first": "vertex_edge", "touching_first": "touching", "triangle": "vertex", "edge": "vertex", "vertex_edge": "edge",
+    "triangle_edge": "edge", "node_child": "node_child", "node_start": "triangle",
+}  # fmt: skip
+"""Arrays of a `Geometry` with indices, and the array whose entries they count."""
+
+
 class Shapes(NamedTuple):
     """The shapes of the bodies of a scene."""
 
@@ -187,6 +195,22 @@ def build_geometry(shapes: Sequence[CompiledShape]) -> Geometry:
         node_count=_join([s.node_count for s in surfaces], (0,), np.int64),
         node_cone=_join([s.node_cone for s in surfaces], (0, 11), np.float64),
     )
+
+
+def joined(first: Geometry, second: Geometry) -> Geometry:
+    """The shapes of two geometries, those of the second behind those of the first."""
+    fields = {}
+    for name, a in first._asdict().items():
+        b = getattr(second, name)
+        if name in _COUNTED:
+            shift = len(getattr(first, _COUNTED[name]))
+        elif name == "touching":
+            shift = np.where(b % 2 == 0, 2 * len(first.vertex), 2 * len(first.edge))
+        else:
+            fields[name] = np.concatenate([a, b])
+            continue
+        fields[name] = np.concatenate([a[:-1] if name.endswith("_first") else a, np.where(b < 0, b, b + shift)])
+    return Geometry(**fields)
 
 
 def compile_shape(shape: Shape, center_of_mass: ArrayLike, principal_rotation: ArrayLike) -> CompiledShape:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.geometry import CompiledShape, Geometry, Shapes
-from rigidimpulse.collision.manifold.shrunk_shapes import convex_depths, convex_polyhedra, several_polyhedra
+from rigidimpulse.collision.manifold.convexity import convex_depths, convex_polyhedra, several_polyhedra
 from rigidimpulse.scene.accuracy import Accuracy
 from rigidimpulse.scene.frames import own_pose
 from rigidimpulse.scene.joint import Joint
@@ -114,7 +114,7 @@ class World:
 
     @cached_property
     def convex_depths(self) -> np.ndarray:
-        """See `collision.manifold.shrunk_shapes.convex_depths`."""
+        """See `collision.manifold.convexity.convex_depths`."""
         return convex_depths(self.geometry)
 
     @cached_property

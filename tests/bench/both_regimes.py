@@ -24,7 +24,7 @@ import trimesh
 from apart import apart
 
 import rigidimpulse as ri
-from rigidimpulse.collision.manifold.shrunk_shapes import inner_radii
+from rigidimpulse.collision.manifold.convexity import inner_radii
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.measure.measure import record_of_recording
 from rigidimpulse.engine.measure.overlap import overlap_depths

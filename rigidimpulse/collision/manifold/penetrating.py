@@ -1,4 +1,4 @@
-"""Contacts of convex bodies deeper inside each other than the shrunk shapes allow: polyhedra, and prisms in place of cylinders.
+"""Contacts of convex bodies deeper inside each other than the smaller shapes allow: polyhedra, and prisms in place of cylinders.
 
 The gap of two convex bodies along a unit normal n from a to b is  s(n) = min_b n.x - max_a n.x;  they are apart if and only if
 some s is above 0, and the contacts of bodies that are apart have such a normal. If there is none, `convex_convex` gives the contacts.
@@ -22,7 +22,7 @@ from rigidimpulse.scene.shape import Shape
 FLUSH = 0.02
 """Gap, in inner radii, below which the points of a face are contacts, too."""
 SIDES = 32
-"""Sides of the prism in a cylinder. It is 0.5 % of the radius inside, less than the cylinder is shrunk for the search."""
+"""Sides of the prism in a cylinder. It is 0.5 % of the radius inside, less than the smaller cylinder of the search."""
 
 
 def solids(
@@ -82,9 +82,9 @@ def supports(geometry, s, x, r, n, out):
 
 
 @jit
-def gap_along(geometry, bodies, a, b, n):
-    """s(n) of bodies a and b, each of one primitive, m."""
-    p, q = geometry.shape_first[bodies.shape[a]], geometry.shape_first[bodies.shape[b]]
+def gap_along(geometry, bodies, a, b, shapes, n):
+    """s(n) of bodies a and b with such shapes (two of them), each of one primitive, m."""
+    p, q = geometry.shape_first[shapes[0]], geometry.shape_first[shapes[1]]
     low = -support(geometry, q, bodies.position[b], bodies.rotation[b], n, -1.0)
     return low - support(geometry, p, bodies.position[a], bodies.rotation[a], n, 1.0)
 

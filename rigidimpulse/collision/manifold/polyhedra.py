@@ -166,7 +166,7 @@ def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | No
     Args:
         geometry: of the shapes.
         convex: (s,) bool, shapes that are one convex polyhedron. bare: (s,) bool, those that get corners, but no faces. several: (s,) bool,
-            those that are several convex polyhedra, see `shrunk_shapes.several_polyhedra`. All others have nothing.
+            those that are several convex polyhedra, see `convexity.several_polyhedra`. All others have nothing.
 
     """
     tables, nothing = _Tables(), np.zeros((0, 3))

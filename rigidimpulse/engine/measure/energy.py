@@ -47,7 +47,7 @@ import math
 
 import numpy as np
 
-from rigidimpulse.collision.manifold.shrunk_shapes import inner_radii
+from rigidimpulse.collision.manifold.convexity import inner_radii
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.measure.record import Fault, RunRecord
 from rigidimpulse.model.world import World

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -24,14 +25,14 @@ from rigidimpulse.collision.contact_cache import (
 )
 from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT
 from rigidimpulse.collision.contact_table import ContactTable
-from rigidimpulse.collision.contact_update import Asked, SmallerShapes, make_asked, mark_apart
+from rigidimpulse.collision.contact_update import Asked, Deep, make_asked, mark_apart
 from rigidimpulse.collision.fat_boxes import BodyBounds, FatBoxes
 from rigidimpulse.collision.geometry import Shapes
+from rigidimpulse.collision.manifold.convexity import convex_polyhedra, inner_radii, several_polyhedra
 from rigidimpulse.collision.manifold.dispatch import GENERAL, PairQuery, Posed, pair_gap
-from rigidimpulse.collision.manifold.inset_surface import inset_surfaces
 from rigidimpulse.collision.manifold.penetrating import solids
 from rigidimpulse.collision.manifold.polyhedra import make_polyhedra
-from rigidimpulse.collision.manifold.shrunk_shapes import convex_polyhedra, inner_radii, several_polyhedra, shrunk_geometry
+from rigidimpulse.collision.manifold.smaller_shapes import SmallerShapes, make_smaller_shapes
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.portable import length
 from rigidimpulse.core.quaternion import to_matrix
@@ -199,7 +200,7 @@ class ContactStepper:
     """
 
     def __init__(self, world: World, movable: np.ndarray, parts: Parts, sharing: Sharing | None = None) -> None:
-        """Make the arrays of the bodies; shrink the shapes for the contact kernels.
+        """Make the arrays of the bodies.
 
         Args:
             world: the compiled scene.
@@ -212,26 +213,18 @@ class ContactStepper:
         self.world, self._sharing = world, sharing or Sharing()
         self.order = np.lexsort(np.column_stack([np.arange(n), world.position[:, ::-1]]).T)
         self.rank = np.argsort(self.order, kind="stable")
-        dynamic_shapes = np.zeros(len(world.geometry.shape_first) - 1, bool)
-        dynamic_shapes[world.shape_of_body[movable]] = True
+        self._moves = np.zeros(len(world.geometry.shape_first) - 1, bool)
+        self._moves[world.shape_of_body[movable]] = True
         self.inner = np.where(movable, inner_radii(world.geometry, world.convex_depths)[world.shape_of_body], np.inf)
         self.skin = TOLERANCES.sub_stepping.skin * self.inner
         self.reach = np.where(world.ball, 0.0, world.bound_radius)
         convex = convex_polyhedra(world.geometry, world.convex_depths)
-        # Soft contacts sink in, and the contact kernels need a gap: smaller shapes for the search.
-        inset, depth, back = inset_surfaces(world.shapes, world.geometry, convex, dynamic_shapes)
-        self.geometry, factor = shrunk_geometry(inset, world.convex_depths, dynamic_shapes)
         self.shapes = make_polyhedra(world.geometry, convex, several=several_polyhedra(world.geometry))
         self._has_general = world.has_general_pairs
         solid_shapes, drum, inset_of_solids = solids(world.shapes, world.geometry, convex, self.shapes)
-        convex |= drum
-        kinds = world.shape_of_body[self.order]
-        self._depth = depth[kinds]
-        self._smaller = SmallerShapes(world.geometry, self.geometry, factor[kinds], back, self._depth, convex[kinds], solid_shapes)
+        self._deep = Deep((convex | drum)[world.shape_of_body[self.order]], solid_shapes)
         self._convex, self._asked = Convex(self.shapes, solid_shapes, inset_of_solids), make_asked(0, n)
-        bound = np.where(np.isfinite(world.bound_radius), world.bound_radius, 0.0)
         self._cornered = (world.flat & ~world.half_space)[self.order]
-        self._taken_off = self._depth + (1.0 - self._smaller.factor) * bound[self.order]
         self.bodies = self._make_bodies()
         self._weights = Weights(world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order]))
         self.balance = make_balance(n)
@@ -276,6 +269,12 @@ class ContactStepper:
             most_cores=self._shares, many_pairs=self._sharing.pairs, many_general=self._sharing.general_pairs,
             many_batches=self._sharing.batches,
         )  # fmt: skip
+
+    @cached_property
+    def smaller(self) -> SmallerShapes:
+        """The shapes that kernels for bodies which are apart are asked about; made where they are."""
+        world = self.world
+        return make_smaller_shapes(world.shapes, world.geometry, world.convex_depths, self._moves, world.shape_of_body, self.order)
 
     def _make_bodies(self) -> SolverBodies:
         """Rows of all bodies by rank, and one of none."""
@@ -415,7 +414,7 @@ class ContactStepper:
         """What general pairs need; the same tuple, likewise."""
         asked, contacts = self._asked, self._buffers[0].contacts
         if self._general_held is None or self._general_held.asked is not asked or self._general_held.contacts is not contacts:
-            self._general_held = General(self._smaller, self.world.shape_of_body, self._taken_off, asked, contacts)
+            self._general_held = General(self.smaller, self._deep, asked, contacts)
         return self._general_held
 
     def _make_space(self, how: int, needed: int) -> None:
@@ -483,9 +482,9 @@ class ContactStepper:
     def _look_at_general(self, run: Run) -> None:
         """Find the contacts of general pairs that have been asked about, on several cores."""
         count, asked, shares, buffers = int(self._progress[WAITING]), self._asked, self._shares, self._buffers
-        of_body, pairs, places = self.world.shape_of_body, self.table.pairs, self._places[: count]
+        pairs, places = self.table.pairs, self._places[: count]
         self._sharing.call(mark_apart, [
-            (self._smaller, of_body, self.bodies, asked, pairs, places, (count * share // shares, count * (share + 1) // shares))
+            (self.smaller, self.bodies, asked, pairs, places, (count * share // shares, count * (share + 1) // shares))
             for share in range(shares)
         ])  # fmt: skip
         while len(buffers) < shares:
@@ -494,7 +493,7 @@ class ContactStepper:
         share = (asked.a[:count] + asked.b[:count]) % shares
         parts = [np.flatnonzero((share == k) & ~asked.is_apart[:count]) for k in range(shares)]
         now = run.state.now._replace(position=asked.position, orientation=asked.orientation)
-        shapes = Shapes(self.geometry, of_body)
+        shapes = Shapes(self.smaller.geometry, self.smaller.of_body)
         questions = [
             Question(shapes, now, asked.rotation, PairQuery(asked.a[part], asked.b[part], asked.shown[part])) for part in parts
         ]  # fmt: skip
@@ -519,11 +518,12 @@ class ContactStepper:
         Exact contact cannot find such a pair again: it took a ring that lay 10 um inside a floor for one that is past it.
         """
         out = np.zeros(self.world.num_bodies, bool)
-        if not (self._depth.any() and asked.any()):
+        depth = self.smaller.depth
+        if not (depth.any() and asked.any()):
             return out
         pairs, world, now = self.table.pairs, self.world, run.state.now
         mine = asked[self.order]
-        which = (mine[pairs.first] | mine[pairs.second]) & (self._depth[pairs.first] + self._depth[pairs.second] > 0.0)
+        which = (mine[pairs.first] | mine[pairs.second]) & (depth[pairs.first] + depth[pairs.second] > 0.0)
         for i, j in zip(self.order[pairs.first[which]].tolist(), self.order[pairs.second[which]].tolist(), strict=True):
             posed = [Posed(int(world.shape_of_body[k]), now.position[k], to_matrix(now.orientation[k])) for k in (i, j)]
             if pair_gap(world.geometry, posed[0], posed[1], self.skin[[i, j]].min(), np.zeros(7)) <= 0.0:
@@ -532,18 +532,19 @@ class ContactStepper:
 
     def report_crossed(self, run: Run, members: np.ndarray, time: float) -> None:
         """Report pairs of members, brought to the present, whose inset surfaces cross: the place of contact is not known any more."""
-        if not self._depth.any():
+        smaller, depth = self.smaller, self.smaller.depth
+        if not depth.any():
             return
         pairs, world, now = self.table.pairs, self.world, run.state.now
         mine = np.zeros(world.num_bodies, bool)
         mine[self.rank[members]] = True
-        asked = (mine[pairs.first] | mine[pairs.second]) & (self._depth[pairs.first] + self._depth[pairs.second] > 0.0)
+        asked = (mine[pairs.first] | mine[pairs.second]) & (depth[pairs.first] + depth[pairs.second] > 0.0)
         asked &= pairs.kind == GENERAL
         for i, j in zip(self.order[pairs.first[asked]].tolist(), self.order[pairs.second[asked]].tolist(), strict=True):
-            a, b, limit = int(world.shape_of_body[i]), int(world.shape_of_body[j]), CROSSED * min(self.inner[i], self.inner[j])
+            a, b, limit = int(smaller.of_body[i]), int(smaller.of_body[j]), CROSSED * min(self.inner[i], self.inner[j])
             rotation = to_matrix(now.orientation[i]), to_matrix(now.orientation[j])
             posed = Posed(a, now.position[i], rotation[0]), Posed(b, now.position[j], rotation[1])
-            if pair_gap(self.geometry, *posed, limit, np.zeros(7)) < limit:
+            if pair_gap(smaller.geometry, *posed, limit, np.zeros(7)) < limit:
                 run.log.report(
                     time, "overlap in a sub-stepped island", (world.names[min(i, j)], world.names[max(i, j)]),
                     "the bodies are deeper inside each other than their contacts can tell; use a smaller step",

@@ -36,10 +36,11 @@ from rigidimpulse.collision.contact_cache import (
     note_changes,
 )
 from rigidimpulse.collision.contact_table import Table
-from rigidimpulse.collision.contact_update import Asked, Searched, SmallerShapes, ask_general, mark_apart, store_contacts
+from rigidimpulse.collision.contact_update import Asked, Deep, Searched, ask_general, mark_apart, store_contacts
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.contact_points import TILT, Contacts
 from rigidimpulse.collision.manifold.dispatch import ALL, PairQuery, contacts_of_pairs
+from rigidimpulse.collision.manifold.smaller_shapes import SmallerShapes
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.simd import width_of
 from rigidimpulse.dynamics.solvers.tgs_soft.bodies import SolverBodies
@@ -102,8 +103,7 @@ class General(NamedTuple):
     """What general pairs need."""
 
     smaller: SmallerShapes
-    of_body: np.ndarray  # (n,) shape of each body, by index
-    taken_off: np.ndarray  # (n,) m, see `ask_general`
+    deep: Deep
     asked: Asked
     contacts: Contacts
 
@@ -210,7 +210,7 @@ def _ask(island, memory, general, progress):
         progress[NEEDED] = waiting
         return MORE_ASKED
     places, margins = memory.places[:waiting], memory.margins[:waiting]
-    ask_general(general.smaller, general.taken_off, island.bodies, memory.table.pairs, places, margins, island.order, general.asked)
+    ask_general(general.smaller, island.bodies, memory.table.pairs, places, margins, island.order, general.asked)
     progress[STAGE] = MARK
     return GOES_ON
 
@@ -220,7 +220,7 @@ def _mark(island, memory, general, progress):
     """Leave out meshes that are too far apart."""
     asked, places, margins, waiting, left = general.asked, memory.places, memory.margins, progress[WAITING], np.int64(0)
     span = (np.int64(0), waiting)
-    mark_apart(general.smaller, general.of_body, island.bodies, asked, memory.table.pairs, places, span)
+    mark_apart(general.smaller, island.bodies, asked, memory.table.pairs, places, span)
     for k in range(waiting):
         if not asked.is_apart[k]:
             places[left], margins[left] = places[k], margins[k]
@@ -234,7 +234,7 @@ def _mark(island, memory, general, progress):
 @jit
 def _search(general, progress):
     """Find the contacts of general pairs."""
-    asked, count, shapes = general.asked, progress[WAITING], Shapes(general.smaller.geometry, general.of_body)
+    asked, count, shapes = general.asked, progress[WAITING], Shapes(general.smaller.geometry, general.smaller.of_body)
     query = PairQuery(asked.a[:count], asked.b[:count], asked.shown[:count])
     found = contacts_of_pairs(shapes, asked, asked.rotation, query, general.contacts, ALL)
     if found < 0:
@@ -254,9 +254,9 @@ def _store(island, memory, general, progress):
         progress[NEEDED] = needed
         return MORE_POINTS
     searched = Searched(memory.places[:count], memory.margins[:count], general.asked.far[:count])
-    contacts = general.contacts
+    shapes, contacts = (general.smaller, general.deep), general.contacts
     store_contacts(
-        general.smaller, island.bodies, memory.table, searched, (contacts.real, contacts.integer), found, island.order, island.coefficients
+        shapes, island.bodies, memory.table, searched, (contacts.real, contacts.integer), found, island.order, island.coefficients
     )
     progress[STAGE] = PLAN
     return GOES_ON

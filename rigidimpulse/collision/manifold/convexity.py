@@ -1,21 +1,11 @@
-"""Convex shapes: which shapes are convex, how deep their centre lies inside, and the same shapes shrunk for the search.
-
-The mesh contact routines need a gap above 0, and soft contacts sink in. A convex shape around its centre of mass is therefore shrunk
-about that centre by the factor f = 1 - SHRINK. With h the distance of a face from the centre, the face moves inwards by SHRINK h, and
-normals stay the same. A corner p of the shrunk shape belongs to the corner p / f of the true one. The foot on a face of what touches it
-does not: it is found again on the true face, see `contact_matching.write_point`. An edge far from the centre is met too early, by
-1 - f of its distance from it.
-"""
+"""Which shapes are convex, how deep their centre of mass lies inside, and which are polyhedra, or made of several."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, ROUND, Geometry
-from rigidimpulse.core.tolerances import TOLERANCES
 
-SHRINK = 1.5 * TOLERANCES.sub_stepping.skin
-"""Part of their lengths by which convex bodies are shrunk for the search."""
 FACES_AT_ONCE = 64
 """Faces whose planes are compared with all vertices at once: few, since the first ones tell that most meshes are not convex."""
 
@@ -105,34 +95,3 @@ def _is_polyhedron(geometry: Geometry, p: int) -> bool:
         return False
     corners = geometry.vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]]
     return _depth_of_faces(geometry, p, corners.sum(axis=0) / len(corners)) > 0.0
-
-
-def shrunk_geometry(geometry: Geometry, depths: np.ndarray, dynamic_shapes: np.ndarray) -> tuple[Geometry, np.ndarray]:
-    """The shapes for the search, and the factor (s,) of their lengths; 1 where a shape is unchanged.
-
-    depths (s,) m: `convex_depths`, of the shapes without inset surfaces; dynamic_shapes (s,) bool: shapes of bodies that move freely.
-    """
-    factor = np.ones(len(geometry.shape_first) - 1)
-    vertex, frame, radius = geometry.vertex.copy(), geometry.frame.copy(), geometry.radius.copy()
-    low, high = geometry.node_min.copy(), geometry.node_max.copy()
-    centre, bound = geometry.bound_centre.copy(), geometry.bound_radius.copy()
-    for s in np.flatnonzero(dynamic_shapes):
-        p = int(geometry.shape_first[s])
-        rounded = geometry.kind[p] == ROUND and geometry.radius[p] > 0.0
-        if rounded or depths[s] <= 0.0:
-            continue
-        factor[s] = 1.0 - SHRINK
-        vertex[geometry.vertex_first[p] : geometry.vertex_first[p + 1]] *= factor[s]
-        nodes = slice(int(geometry.node_first[p]), int(geometry.node_first[p + 1]))
-        # The box tree and the bounding sphere shrink about the centre of mass like the vertices.
-        low[nodes] *= factor[s]
-        high[nodes] *= factor[s]
-        centre[p] *= factor[s]
-        bound[p] *= factor[s]
-        if geometry.kind[p] == CYLINDER:
-            frame[p, :3] *= factor[s]
-            frame[p, 6] *= factor[s]
-            radius[p] *= factor[s]
-    return geometry._replace(
-        vertex=vertex, frame=frame, radius=radius, node_min=low, node_max=high, bound_centre=centre, bound_radius=bound
-    ), factor

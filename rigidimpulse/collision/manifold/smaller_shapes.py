@@ -1,0 +1,251 @@
+"""Smaller shapes for the search of contacts of bodies that may be a little inside each other.
+
+Soft contacts let bodies sink in, and the kernels of `dispatch` need bodies that are apart. So they are asked about smaller shapes with the
+same corners, edges and faces, and what they find is put back. A point of the smaller shape moves by m(p) to its place on the true one:
+
+    polyhedra that are convex    shrunk about their centre of mass by 1 - SHRINK: normals stay the same
+    cylinders                    shorter by SHRINK of their radius, or of their half height if that is less, and as much of it thinner
+    other bodies that move       inset surfaces, see `inset_surface`; their rounded parts get thinner
+
+At a corner m is known, on an edge or in a face it is the mean of m at its corners there. With the normal n from a to b, gap and place are
+
+    g = g' - m_a.n + m_b.n,    p = p' + (m.n) n + t.
+
+The place across the normal, t, is that of a corner or a rim on what it meets, and that of the crossing of two edges.
+
+A ball, a capsule or a smaller cylinder can take up what bodies sink in. So a convex polyhedron that meets one is asked about as it is. Were
+it shrunk, a ball that rolls off the end of a plank would leave it too early, by SHRINK of the distance to the middle of the plank.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
+from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, CompiledShape, Geometry, Primitive, build_geometry, joined
+from rigidimpulse.collision.manifold.convexity import convex_polyhedra, inner_radii
+from rigidimpulse.collision.manifold.cylinder_rims import FIRST_FEATURE, NUM_FEATURES, RIM
+from rigidimpulse.collision.manifold.inset_surface import moved_in
+from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import along, cross, dot, row, scaled, subtract, turned_back_by, turned_by
+
+SHRINK = 1.5 * TOLERANCES.sub_stepping.skin
+"""Part of their lengths by which convex bodies are smaller."""
+DEPTH = 0.012
+"""d of inset surfaces, as a part of the radius that encloses a body."""
+THIN = 0.25
+"""Part of the radius of a ball, capsule or cylinder in a compound that d may be."""
+CROSSWISE = 0.1
+"""Sine of the angle of two edges from which the place where they cross is asked for."""
+AT_CORNER, ON_RIM, ON_CYLINDER, ON_EDGE, IN_FACE = (np.int64(where) for where in range(5))
+"""Where on a body a contact is. At a corner or on a rim the body has the place of the contact, the corner before the rim."""
+ZERO = (0.0, 0.0, 0.0)
+
+
+class SmallerShapes(NamedTuple):
+    """The shapes that the search is asked about, of n bodies."""
+
+    geometry: Geometry  # the shapes of the scene, and the smaller ones behind them
+    number: int  # of shapes of the scene
+    of_body: np.ndarray  # (2 n,) by index: the smaller shape of each body, or its own where there is none; then its own
+    back: np.ndarray  # (V, 4) m at each vertex, m, and how much thinner its rounding is, m
+    growth: np.ndarray  # (P, 2) half height and radius that a cylinder has lost, as a part of those that it has
+    taken_off: np.ndarray  # (n,) m, by rank: how far the smaller surface is inside the true one
+    depth: np.ndarray  # (n,) m, by rank: the same of inset surfaces
+    polyhedron: np.ndarray  # (n,) bool, by rank: convex polyhedra
+    takes_up: np.ndarray  # (n,) bool, by rank: whether what meets the body may be asked about as it is
+
+
+def make_smaller_shapes(
+    shapes: Sequence[CompiledShape], geometry: Geometry, depths: np.ndarray, moves: np.ndarray, of_body: np.ndarray, order: np.ndarray
+) -> SmallerShapes:
+    """Make the smaller shapes of a scene.
+
+    Args:
+        shapes: all shapes of the scene; geometry: their arrays.
+        depths: (s,) m, `convexity.convex_depths`.
+        moves: (s,) bool, shapes of bodies that move freely.
+        of_body: (n,) shape of each body, by index; order: (n,) indices by rank.
+
+    """
+    number, convex, inner = len(shapes), convex_polyhedra(geometry, depths), inner_radii(geometry, depths)
+    shape, depth, takes_up, made = np.arange(number), np.zeros(number), np.zeros(number, bool), []
+    for s, compiled in enumerate(shapes):
+        one = compiled.primitives[0]
+        single = len(compiled.primitives) == 1
+        takes_up[s] = single and (one.kind == CYLINDER or one.radius >= max(SHRINK * inner[s], 1e-300))
+        if single and one.kind == CYLINDER:
+            smaller = CompiledShape((_shorter(one, SHRINK * min(one.radius, float(one.frame[6])), SHRINK * one.radius),))
+        elif not moves[s] or (single and not len(one.faces)):
+            continue
+        elif convex[s]:
+            smaller = CompiledShape((replace(one, vertices=(1.0 - SHRINK) * one.vertices),))
+        else:
+            depth[s] = d = _inset_depth(geometry, s, compiled)
+            smaller = CompiledShape(tuple(_inset(p, d) for p in compiled.primitives))
+        shape[s] = number + len(made)
+        made.append((s, smaller))
+    everything = joined(geometry, build_geometry([smaller for _, smaller in made])) if made else geometry
+    back, growth = _lost(geometry, everything, made)
+    taken_off = depth.copy()
+    for k, (s, _) in enumerate(made):
+        if depth[s] == 0.0:
+            taken_off[s] = _most_taken_off(everything, back, growth, number + k)
+    own = of_body[order]
+    return SmallerShapes(
+        everything, number, np.concatenate([shape[of_body], of_body]), back, growth, taken_off[own], depth[own], convex[own], takes_up[own]
+    )
+
+
+def _inset_depth(geometry: Geometry, s: int, compiled: CompiledShape) -> float:
+    """Depth d of the inset surface of shape s, m."""
+    first, last = int(geometry.shape_first[s]), int(geometry.shape_first[s + 1])
+    reach = np.linalg.norm(geometry.bound_centre[first:last], axis=1) + geometry.bound_radius[first:last]
+    # A ball, capsule or cylinder can give up only a part of its radius, which limits the depth of all.
+    return min([DEPTH * float(reach.max()), *(THIN * _radius(p) for p in compiled.primitives if not len(p.faces))])
+
+
+def _radius(p: Primitive) -> float:
+    """Smallest radius of a ball, capsule or cylinder, m."""
+    return min(p.radius, float(p.frame[6])) if p.kind == CYLINDER else p.radius
+
+
+def _inset(p: Primitive, d: float) -> Primitive:
+    """The inset surface of a primitive, at a depth of d m."""
+    if p.kind == CYLINDER:
+        return _shorter(p, d, d)
+    return replace(p, vertices=moved_in(p, d)) if len(p.faces) else replace(p, radius=p.radius - d)
+
+
+def _shorter(cylinder: Primitive, half: float, radius: float) -> Primitive:
+    """A cylinder whose half height and radius are less by so much, m."""
+    return replace(cylinder, radius=cylinder.radius - radius, frame=np.append(cylinder.frame[:6], cylinder.frame[6] - half))
+
+
+def _lost(true: Geometry, everything: Geometry, made: list[tuple[int, CompiledShape]]) -> tuple[np.ndarray, np.ndarray]:
+    """What the smaller shapes that were made of the true ones have lost: `back` and `growth` of `SmallerShapes`."""
+    back, growth, p = np.zeros((len(everything.vertex), 4)), np.zeros((len(everything.kind), 2)), len(true.kind)
+    for s, smaller in made:
+        for q in range(int(true.shape_first[s]), int(true.shape_first[s]) + len(smaller.primitives)):
+            mine = slice(int(everything.vertex_first[p]), int(everything.vertex_first[p + 1]))
+            back[mine, :3] = true.vertex[true.vertex_first[q] : true.vertex_first[q + 1]] - everything.vertex[mine]
+            back[mine, 3] = true.radius[q] - everything.radius[p]
+            if true.kind[q] == CYLINDER:
+                growth[p] = true.frame[q, 6] / everything.frame[p, 6] - 1.0, true.radius[q] / everything.radius[p] - 1.0
+            p += 1
+    return back, growth
+
+
+def _most_taken_off(everything: Geometry, back: np.ndarray, growth: np.ndarray, s: int) -> float:
+    """Largest |m| of a smaller shape of one primitive, m."""
+    p = int(everything.shape_first[s])
+    lost = growth[p] * [everything.frame[p, 6], everything.radius[p]]
+    moved = np.linalg.norm(back[everything.vertex_first[p] : everything.vertex_first[p + 1], :3], axis=1)
+    return float(max(np.linalg.norm(lost), moved.max(initial=0.0)))
+
+
+@jit
+def put_back(smaller, bodies, a, b, real, integer, c):
+    """Put the points of contact c of bodies a and b from the smaller shapes back to the true bodies, with its gap.
+
+    real (k, 10), in the world, and integer (k, 5): contacts; bodies: by their places in `smaller.of_body`.
+    """
+    n = (real[c, 6], real[c, 7], real[c, 8])
+    where_a, m_a, edge_a = _moved(smaller, bodies, a, n, real, integer, c, 0)
+    where_b, m_b, edge_b = _moved(smaller, bodies, b, n, real, integer, c, 1)
+    rise_a, rise_b = dot(m_a, n), dot(m_b, n)
+    place = ZERO
+    if where_a < ON_CYLINDER and where_a < where_b:
+        place = along(m_a, -rise_a, n)
+    elif where_b < ON_CYLINDER and where_b < where_a:
+        place = along(m_b, -rise_b, n)
+    elif where_a == ON_EDGE and where_b == ON_EDGE:
+        place = _crossing(n, edge_a, edge_b, m_a, m_b)
+    for k in range(3):
+        real[c, k] += rise_a * n[k] + place[k]
+        real[c, 3 + k] += rise_b * n[k] + place[k]
+    real[c, 9] += rise_b - rise_a
+
+
+@jit
+def _crossing(n, edge_a, edge_b, m_a, m_b):
+    """How far the place where two edges cross, seen along n, moves while they move by m_a and m_b."""
+    across_a, across_b = cross(n, edge_a), cross(n, edge_b)
+    sine_a, sine_b = dot(edge_b, across_a), dot(edge_a, across_b)
+    if sine_a * sine_a <= CROSSWISE * CROSSWISE * dot(edge_a, edge_a) * dot(edge_b, edge_b):
+        return ZERO
+    return along(scaled(edge_b, dot(m_a, across_a) / sine_a), dot(m_b, across_b) / sine_b, edge_a)
+
+
+@jit
+def _moved(smaller, bodies, i, n, real, integer, c, side):
+    """Where on body i, the first (side 0) or second of contact c, it is; m there, and the direction of the edge it is on, in the world."""
+    geometry, x, at = smaller.geometry, bodies.position, 3 * side
+    shape = smaller.of_body[integer[c, side]]
+    where, feature = _where(geometry, shape, integer[c, 2], side, integer[c, 3 + side])
+    edge = ZERO
+    if where == ON_EDGE:
+        along_it = subtract(row(geometry.vertex, geometry.edge[feature, 1]), row(geometry.vertex, geometry.edge[feature, 0]))
+        edge = turned_by(bodies.rotation, i, along_it[0], along_it[1], along_it[2])
+    if shape < smaller.number:
+        return where, ZERO, edge
+    p = turned_back_by(bodies.rotation, i, real[c, at] - x[i, 0], real[c, at + 1] - x[i, 1], real[c, at + 2] - x[i, 2])
+    if where == ON_CYLINDER or where == ON_RIM:
+        m, thinner = _moved_on_cylinder(geometry.frame, smaller.growth, feature, p), 0.0
+    else:
+        m, thinner = _mean(geometry, smaller.back, where, feature, p)
+    m = turned_by(bodies.rotation, i, m[0], m[1], m[2])
+    return where, along(m, thinner if side == 0 else -thinner, n), edge
+
+
+@jit
+def _where(geometry, shape, kind, side, feature):
+    """Where on a shape a feature of a contact is, and the vertex, edge, triangle or cylinder of it."""
+    if geometry.kind[geometry.shape_first[shape]] == HALF_SPACE:
+        return IN_FACE, feature
+    if kind == VERTEX_FACE or kind == FACE_VERTEX:
+        return AT_CORNER if (kind == VERTEX_FACE) == (side == 0) else IN_FACE, feature
+    if kind == EDGE_EDGE:
+        return ON_EDGE, feature
+    if kind == CORNER:
+        return AT_CORNER if feature % 2 == 0 else ON_EDGE, feature // 2
+    if kind == HALF_SPACE_CONTACT:
+        return AT_CORNER, feature
+    if feature < FIRST_FEATURE:
+        return AT_CORNER if feature % 3 == 0 else (ON_EDGE if feature % 3 == 1 else IN_FACE), feature // 3
+    feature -= FIRST_FEATURE
+    return ON_RIM if feature % NUM_FEATURES >= RIM else ON_CYLINDER, feature // NUM_FEATURES
+
+
+@jit
+def _moved_on_cylinder(frame, growth, p, x):
+    """m of the place x on cylinder p, in the frame of the body: along the axis and out of it."""
+    axis = (frame[p, 3], frame[p, 4], frame[p, 5])
+    from_centre = subtract(x, row(frame, p))
+    height = dot(from_centre, axis)
+    return along(scaled(axis, growth[p, 0] * height), growth[p, 1], along(from_centre, -height, axis))
+
+
+@jit
+def _mean(geometry, back, where, feature, x):
+    """m at the vertex `feature`, or at the place x on such an edge or triangle, in the frame of the body, and how much thinner it is."""
+    if where == AT_CORNER:
+        return row(back, feature), back[feature, 3]
+    corner = geometry.edge[feature] if where == ON_EDGE else geometry.triangle[feature]
+    i, j, k = corner[0], corner[1], corner[-1]
+    origin = row(geometry.vertex, i)
+    e, f, r = subtract(row(geometry.vertex, j), origin), subtract(row(geometry.vertex, k), origin), subtract(x, origin)
+    ee, ef, ff, re, rf = dot(e, e), dot(e, f), dot(f, f), dot(r, e), dot(r, f)
+    area = ee * ff - ef * ef
+    if where == IN_FACE and area > 0.0:
+        u, v = (ff * re - ef * rf) / area, (ee * rf - ef * re) / area
+    else:
+        u, v = min(max(re / ee, 0.0), 1.0) if ee > 0.0 else 0.0, 0.0
+    w = 1.0 - u - v
+    m = along(along(scaled(row(back, i), w), u, row(back, j)), v, row(back, k))
+    return m, w * back[i, 3] + u * back[j, 3] + v * back[k, 3]
