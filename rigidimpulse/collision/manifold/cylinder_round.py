@@ -146,11 +146,13 @@ def cylinder_round_contacts(geometry, cylinder, round_, pose, margin, contacts, 
                 arc = (to_axes(view.x, view.y, view.z, normal_0), to_axes(view.x, view.y, view.z, normal_1))
                 seen_edge = _Edge(tail, d, arc, edge_kind[edge], skeleton)
                 count = _edge_contacts(solid, found, count, seen_edge, 3 * edge + 1)
-            if skeleton == 0.0 and k < (1 if geometry.closed[round_] else 2):  # an open surface has two sides
-                m = to_axes(view.x, view.y, view.z, row(geometry.triangle_normal, triangle))
-                m = along(ZERO, 1.0 - 2.0 * k, m)
-                count = rims_on_plane(solid, found, count, m, (a, b, c), TRIANGLE, 3 * triangle + 2)
-                a, b = b, a
+            if skeleton == 0.0 and k == 0:
+                m, corners = to_axes(view.x, view.y, view.z, row(geometry.triangle_normal, triangle)), (a, b, c)
+                # An open surface has two sides: the centre, 0 here, tells on which one the cylinder is. Asked about both, a rim that was
+                # level with the surface had contacts that pressed it to either, and most cylinders fell through a landscape.
+                if not geometry.closed[round_] and dot(m, a) > 0.0:
+                    m, corners = along(ZERO, -1.0, m), (b, a, c)
+                count = rims_on_plane(solid, found, count, m, corners, TRIANGLE, 3 * triangle + 2)
     if skeleton > 0.0 or count == found.first:  # the closest point of a smooth body is a contact in any case
         pair, triangle = _closest_triangle(geometry, solid, view, round_, margin + skeleton, stack)
         distance, p, q, n = pair
