@@ -19,7 +19,7 @@ from rigidimpulse.collision.manifold.polyhedra import POINTS, Polyhedra, make_sc
 from rigidimpulse.collision.manifold.polyhedra import Points as Found
 from rigidimpulse.collision.manifold.reduce import GAP_WEIGHT, PER_NORMAL, reduce_contacts
 from rigidimpulse.collision.manifold.rounding import only_primitive, side_radius
-from rigidimpulse.collision.manifold.smaller_shapes import put_back
+from rigidimpulse.collision.manifold.smaller_shapes import level_of, put_back
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.vector import turned_by
 
@@ -47,41 +47,65 @@ class Searched(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """What `manifold.dispatch` is asked about the k pairs, and where the n bodies are: with smaller shapes, then with their own."""
+    """What `manifold.dispatch` is asked about the k pairs, and where the n bodies are, for each of the L levels of their shapes."""
 
     a: np.ndarray  # (k,)
     b: np.ndarray  # (k,)
     shown: np.ndarray  # (k,) m, distance of the search, between the shapes that are asked about
     far: np.ndarray  # (k,) m, the same between the true ones
-    position: np.ndarray  # (2 n, 3) m
-    orientation: np.ndarray  # (2 n, 4)
-    rotation: np.ndarray  # (2 n, 3, 3)
+    position: np.ndarray  # (L n, 3) m
+    orientation: np.ndarray  # (L n, 4)
+    rotation: np.ndarray  # (L n, 3, 3)
     is_apart: np.ndarray  # (k,) bool, there is no contact, see `mark_apart`
 
 
 def make_asked(pairs: int, number: int) -> Asked:
-    """Space for questions about `pairs` pairs of `number` bodies."""
+    """Space for questions about `pairs` pairs of bodies; number: of bodies and levels, n L."""
     a, b, shown, far = np.zeros(pairs, np.int64), np.zeros(pairs, np.int64), np.zeros(pairs), np.zeros(pairs)
-    poses = np.zeros((2 * number, 3)), np.zeros((2 * number, 4)), np.zeros((2 * number, 3, 3))
-    return Asked(a, b, shown, far, *poses, np.zeros(pairs, bool))
+    return Asked(a, b, shown, far, np.zeros((number, 3)), np.zeros((number, 4)), np.zeros((number, 3, 3)), np.zeros(pairs, bool))
 
 
 @jit
-def ask_general(smaller, bodies, pairs, places, margins, order, asked):
+def _gap_now(bodies, pairs, p, point):
+    """Gap of a contact point of pair p as the bodies are now, m, and its normal."""
+    a, b = pairs.first[p], pairs.second[p]
+    nx, ny, nz = turned_by(bodies.rotation, b if pairs.carrier[p] else a, point[0], point[1], point[2])
+    ax, ay, az = turned_by(bodies.rotation, a, point[SKELETON_A], point[SKELETON_A + 1], point[SKELETON_A + 2])
+    bx, by, bz = turned_by(bodies.rotation, b, point[SKELETON_B], point[SKELETON_B + 1], point[SKELETON_B + 2])
+    apart = (
+        (bodies.position[b, 0] - bodies.position[a, 0] + bx - ax) * nx
+        + (bodies.position[b, 1] - bodies.position[a, 1] + by - ay) * ny
+        + (bodies.position[b, 2] - bodies.position[a, 2] + bz - az) * nz
+    )
+    return apart - (point[ROUND_A] + point[ROUND_B]), nx, ny, nz
+
+
+@jit
+def _deepest(bodies, table, p):
+    """How deep the bodies of a pair are inside each other at the contacts that it had, m; 0 if they are not."""
+    pairs, points, _, _ = table
+    deepest = 0.0
+    for r in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
+        deepest = max(deepest, -_gap_now(bodies, pairs, p, points[r])[0])
+    return deepest
+
+
+@jit
+def ask_general(smaller, bodies, table, places, margins, order, asked):
     """Write what is asked about the pairs at `places` (k,), whose contacts are wanted within margins (k,) m.
 
     order (n,): indices of the scene by rank.
     """
     depth, position, orientation, rotation, n = smaller.depth, bodies.position, bodies.orientation, bodies.rotation, order.shape[0]
     for k in range(places.shape[0]):
-        first, second = pairs.first[places[k]], pairs.second[places[k]]
+        first, second = table.pairs.first[places[k]], table.pairs.second[places[k]]
         # A wide margin is expensive for meshes.
         far = margins[k] if depth[first] + depth[second] > 0.0 else FARTHER * margins[k]
-        whole_first = smaller.polyhedron[first] and smaller.takes_up[second]
-        whole_second = smaller.polyhedron[second] and smaller.takes_up[first]
-        asked.a[k], asked.b[k] = order[first] + (n if whole_first else 0), order[second] + (n if whole_second else 0)
+        deepest = _deepest(bodies, table, places[k])
+        level_first, level_second = level_of(smaller, first, second, deepest), level_of(smaller, second, first, deepest)
+        asked.a[k], asked.b[k] = order[first] + n * level_first, order[second] + n * level_second
         asked.far[k] = far
-        asked.shown[k] = far + (0.0 if whole_first else smaller.taken_off[first]) + (0.0 if whole_second else smaller.taken_off[second])
+        asked.shown[k] = far + smaller.taken_off[level_first, first] + smaller.taken_off[level_second, second]
         # In the middle of a step bodies are elsewhere than at its start.
         for i, at in ((first, asked.a[k]), (second, asked.b[k])):
             for j in range(3):
@@ -117,18 +141,9 @@ def mark_apart(smaller, bodies, asked, pairs, places, span):
 @jit
 def _contradicts(bodies, pairs, p, points, new, new_end):
     """Whether the new contacts of a pair are impossible: there are none though an old one is closed, or its normal has turned round."""
-    a, b = pairs.first[p], pairs.second[p]
-    carrier = b if pairs.carrier[p] else a
     for o in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
         old = points[o]
-        nx, ny, nz = turned_by(bodies.rotation, carrier, old[0], old[1], old[2])
-        ax, ay, az = turned_by(bodies.rotation, a, old[SKELETON_A], old[SKELETON_A + 1], old[SKELETON_A + 2])
-        bx, by, bz = turned_by(bodies.rotation, b, old[SKELETON_B], old[SKELETON_B + 1], old[SKELETON_B + 2])
-        gap = (
-            (bodies.position[b, 0] - bodies.position[a, 0] + bx - ax) * nx
-            + (bodies.position[b, 1] - bodies.position[a, 1] + by - ay) * ny
-            + (bodies.position[b, 2] - bodies.position[a, 2] + bz - az) * nz
-        ) - (old[ROUND_A] + old[ROUND_B])
+        gap, _, _, _ = _gap_now(bodies, pairs, p, old)
         if new == new_end and gap < old[SKIN]:
             return True
         if gap > old[SKIN]:

@@ -231,8 +231,9 @@ class WaysOut:
                 continue
             free = way
             rate = float(dot(n, found.normal))
-            # Along a surface that is nearly parallel to n the rate tells nothing: steps of 1e10 m came of it.
-            way -= left if careful or abs(left) >= 2.0 * reach * rate else left / rate
+            # Along a surface that is nearly parallel to n the rate tells nothing: steps of 1e10 m came of it. At c itself they overlap: a
+            # step past it leads through a hole to the far side, and from there on and on.
+            way -= left if careful or abs(left) >= 2.0 * reach * rate or left >= rate * way else left / rate
             if abs(left) <= fine:
                 break
         return way

@@ -195,6 +195,22 @@ def test_links_put_into_each_other_come_apart_and_what_is_in_a_pipe_stays_in_it(
     assert np.linalg.norm(inside.positions[1, 1:, :2], axis=1).max() < 0.3
 
 
+@pytest.mark.parametrize("seed", [9, 10, 11])
+def test_the_way_out_of_the_wall_of_a_pipe_does_not_lead_through_its_hole_and_on(seed: int) -> None:
+    """A hull was said to be inside by -2e9 m: steps along a way out passed the hole, and doubled behind it."""
+    from trimesh.creation import annulus
+
+    hollow, random = annulus(0.5, 0.6, 0.5, sections=32), np.random.default_rng(seed)
+    turn, corners = random.normal(size=4), random.normal(size=(12, 3))
+    hull = ri.Shape.convex_hull(0.15 * corners / np.linalg.norm(corners, axis=1)[:, None])
+    angle, height = random.uniform(0.0, 6.3), random.uniform(-0.1, 0.1)
+    place = {"position": (0.4 * np.cos(angle), 0.4 * np.sin(angle), height), "orientation": turn / np.linalg.norm(turn)}
+    run = simulate({"pipe": {"shape": ri.Shape.mesh(hollow.vertices, hollow.faces), "motion": "static"}, "hull": {"shape": hull} | place})
+    assert 0.0 < depths(run)["pipe", "hull"] < 0.3
+    assert [event.kind for event in run.status.events] == ["overlap at the start"]
+    assert all_apart(run, 1)
+
+
 def test_static_bodies_may_overlap_and_touching_is_no_overlap() -> None:
     bodies = {"floor": FLOOR, "post": {"shape": BOX, "motion": "static"}, "box": {"shape": BOX, "position": (0, 0, 1.0)}}
     assert simulate(bodies, G).status.ok

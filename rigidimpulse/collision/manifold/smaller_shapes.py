@@ -7,6 +7,10 @@ same corners, edges and faces, and what they find is put back. A point of the sm
     cylinders                    shorter by SHRINK of their radius, or of their half height if that is less, and as much of it thinner
     other bodies that move       inset surfaces, see `inset_surface`; their rounded parts get thinner
 
+What is convex has smaller shapes of several levels. Where a heavy body presses a light one into a mesh, it may be deeper inside than the
+first level allows. Then the next one is asked about, whose surface is d inside along each axis of the body. Before, thin boxes and rods on
+a floor that is a mesh fell through it when a heavier body landed on them.
+
 At a corner m is known, on an edge or in a face it is the mean of m at its corners there. With the normal n from a to b, gap and place are
 
     g = g' - m_a.n + m_b.n,    p = p' + (m.n) n + t.
@@ -36,8 +40,14 @@ from rigidimpulse.core.vector import along, cross, dot, row, scaled, subtract, t
 
 SHRINK = 1.5 * TOLERANCES.sub_stepping.skin
 """Part of their lengths by which convex bodies are smaller."""
+DEEPER = (0.05, 0.2, 0.6)
+"""d of the levels after the first, as a part of the inner radius."""
+LEVELS = 2 + len(DEEPER)
+"""Shapes of each body: its own, the first smaller one, and the others."""
 DEPTH = 0.012
 """d of inset surfaces, as a part of the radius that encloses a body."""
+ENOUGH = 2.0
+"""Depths of a contact that the level which is asked about must allow: it may be as much deeper at the next look."""
 THIN = 0.25
 """Part of the radius of a ball, capsule or cylinder in a compound that d may be."""
 CROSSWISE = 0.1
@@ -52,12 +62,14 @@ class SmallerShapes(NamedTuple):
 
     geometry: Geometry  # the shapes of the scene, and the smaller ones behind them
     number: int  # of shapes of the scene
-    of_body: np.ndarray  # (2 n,) by index: the smaller shape of each body, or its own where there is none; then its own
+    of_body: np.ndarray  # (L n,) by index: the shapes of the bodies; the smaller ones, or their own where there are none; the next levels
     back: np.ndarray  # (V, 4) m at each vertex, m, and how much thinner its rounding is, m
     growth: np.ndarray  # (P, 2) half height and radius that a cylinder has lost, as a part of those that it has
-    taken_off: np.ndarray  # (n,) m, by rank: how far the smaller surface is inside the true one
-    depth: np.ndarray  # (n,) m, by rank: the same of inset surfaces
+    taken_off: np.ndarray  # (L, n) m, by rank: how far points of each level are from those of the body at most
+    slack: np.ndarray  # (L, n) m, by rank: how far the faces of each level of a convex body are inside
+    depth: np.ndarray  # (n,) m, by rank: d of inset surfaces
     polyhedron: np.ndarray  # (n,) bool, by rank: convex polyhedra
+    deeper: np.ndarray  # (n,) bool, by rank: these and cylinders, which have more levels than the first
     takes_up: np.ndarray  # (n,) bool, by rank: whether what meets the body may be asked about as it is
 
 
@@ -74,32 +86,45 @@ def make_smaller_shapes(
 
     """
     number, convex, inner = len(shapes), convex_polyhedra(geometry, depths), inner_radii(geometry, depths)
-    shape, depth, takes_up, made = np.arange(number), np.zeros(number), np.zeros(number, bool), []
+    depth, takes_up, deeper, made = np.zeros(number), np.zeros(number, bool), np.zeros(number, bool), []
+    slack, taken_off = np.zeros((LEVELS, number)), np.zeros((LEVELS, number))
     for s, compiled in enumerate(shapes):
-        one = compiled.primitives[0]
-        single = len(compiled.primitives) == 1
-        takes_up[s] = single and (one.kind == CYLINDER or one.radius >= max(SHRINK * inner[s], 1e-300))
-        if single and one.kind == CYLINDER:
-            smaller = CompiledShape((_shorter(one, SHRINK * min(one.radius, float(one.frame[6])), SHRINK * one.radius),))
-        elif not moves[s] or (single and not len(one.faces)):
-            continue
-        elif convex[s]:
-            smaller = CompiledShape((replace(one, vertices=(1.0 - SHRINK) * one.vertices),))
-        else:
+        one, single = compiled.primitives[0], len(compiled.primitives) == 1
+        drum = single and one.kind == CYLINDER
+        takes_up[s] = drum or (single and one.radius >= max(SHRINK * inner[s], 1e-300))
+        deeper[s] = drum or (moves[s] and convex[s])
+        if deeper[s]:
+            slack[1:, s] = np.array([SHRINK, *DEEPER]) * (_radius(one) if drum else inner[s])
+            made += [(s, 1, _shrunk(one)), *((s, level, _deeper(one, slack[level, s])) for level in range(2, LEVELS))]
+        elif moves[s] and (not single or len(one.faces)):
             depth[s] = d = _inset_depth(geometry, s, compiled)
-            smaller = CompiledShape(tuple(_inset(p, d) for p in compiled.primitives))
-        shape[s] = number + len(made)
-        made.append((s, smaller))
-    everything = joined(geometry, build_geometry([smaller for _, smaller in made])) if made else geometry
+            made.append((s, 1, CompiledShape(tuple(_inset(p, d) for p in compiled.primitives))))
+    everything = joined(geometry, build_geometry([smaller for _, _, smaller in made])) if made else geometry
     back, growth = _lost(geometry, everything, made)
-    taken_off = depth.copy()
-    for k, (s, _) in enumerate(made):
-        if depth[s] == 0.0:
-            taken_off[s] = _most_taken_off(everything, back, growth, number + k)
+    shape = np.tile(np.arange(number), (LEVELS, 1))
+    for k, (s, level, _) in enumerate(made):
+        shape[level:, s] = number + k
+        taken_off[level:, s] = depth[s] if depth[s] > 0.0 else _most_taken_off(everything, back, growth, number + k)
     own = of_body[order]
+    taken_off, slack = np.ascontiguousarray(taken_off[:, own]), np.ascontiguousarray(slack[:, own])
     return SmallerShapes(
-        everything, number, np.concatenate([shape[of_body], of_body]), back, growth, taken_off[own], depth[own], convex[own], takes_up[own]
+        everything, number, shape[:, of_body].ravel(), back, growth, taken_off, slack, depth[own], convex[own], deeper[own], takes_up[own]
     )
+
+
+def _shrunk(p: Primitive) -> CompiledShape:
+    """The first level of a convex polyhedron or a cylinder."""
+    if p.kind == CYLINDER:
+        return CompiledShape((_shorter(p, SHRINK * _radius(p), SHRINK * p.radius),))
+    return CompiledShape((replace(p, vertices=(1.0 - SHRINK) * p.vertices),))
+
+
+def _deeper(p: Primitive, d: float) -> CompiledShape:
+    """A level of these whose surface is d m inside along each axis of the body."""
+    if p.kind == CYLINDER:
+        return CompiledShape((_shorter(p, d, d),))
+    reach = np.minimum(p.vertices.max(axis=0), -p.vertices.min(axis=0))
+    return CompiledShape((replace(p, vertices=p.vertices * (1.0 - d / reach)),))
 
 
 def _inset_depth(geometry: Geometry, s: int, compiled: CompiledShape) -> float:
@@ -111,7 +136,7 @@ def _inset_depth(geometry: Geometry, s: int, compiled: CompiledShape) -> float:
 
 
 def _radius(p: Primitive) -> float:
-    """Smallest radius of a ball, capsule or cylinder, m."""
+    """Radius of a ball or capsule, of a cylinder this or half its height if that is less, m."""
     return min(p.radius, float(p.frame[6])) if p.kind == CYLINDER else p.radius
 
 
@@ -127,10 +152,10 @@ def _shorter(cylinder: Primitive, half: float, radius: float) -> Primitive:
     return replace(cylinder, radius=cylinder.radius - radius, frame=np.append(cylinder.frame[:6], cylinder.frame[6] - half))
 
 
-def _lost(true: Geometry, everything: Geometry, made: list[tuple[int, CompiledShape]]) -> tuple[np.ndarray, np.ndarray]:
+def _lost(true: Geometry, everything: Geometry, made: list[tuple[int, int, CompiledShape]]) -> tuple[np.ndarray, np.ndarray]:
     """What the smaller shapes that were made of the true ones have lost: `back` and `growth` of `SmallerShapes`."""
     back, growth, p = np.zeros((len(everything.vertex), 4)), np.zeros((len(everything.kind), 2)), len(true.kind)
-    for s, smaller in made:
+    for s, _, smaller in made:
         for q in range(int(true.shape_first[s]), int(true.shape_first[s]) + len(smaller.primitives)):
             mine = slice(int(everything.vertex_first[p]), int(everything.vertex_first[p + 1]))
             back[mine, :3] = true.vertex[true.vertex_first[q] : true.vertex_first[q + 1]] - everything.vertex[mine]
@@ -147,6 +172,18 @@ def _most_taken_off(everything: Geometry, back: np.ndarray, growth: np.ndarray, 
     lost = growth[p] * [everything.frame[p, 6], everything.radius[p]]
     moved = np.linalg.norm(back[everything.vertex_first[p] : everything.vertex_first[p + 1], :3], axis=1)
     return float(max(np.linalg.norm(lost), moved.max(initial=0.0)))
+
+
+@jit
+def level_of(smaller, i, other, depth):
+    """The level of the shapes about which body i is asked beside another one; depth: m, of their contacts."""
+    if smaller.polyhedron[i] and smaller.takes_up[other]:
+        return 0
+    level = 1
+    if smaller.deeper[i] and not smaller.deeper[other]:
+        while level + 1 < LEVELS and smaller.slack[level, i] < ENOUGH * depth:
+            level += 1
+    return level
 
 
 @jit

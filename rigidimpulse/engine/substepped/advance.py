@@ -255,7 +255,7 @@ class SubsteppedIslands:
         a, b = a[which], b[which]
         margin = TOUCHES * np.minimum(self.stepper.skin[a], self.stepper.skin[b])
         buffer = run.contact_buffer
-        shapes = Shapes(self.stepper.smaller.geometry, self.stepper.smaller.of_body)
+        shapes = Shapes(self.stepper.smaller.geometry, self.stepper.smaller.of_body[world.num_bodies :])
         count = buffer.find(Question(shapes, run.state.now, run.state.rotation, PairQuery(a, b, margin)))
         touched = np.unique(buffer.integer[:count, :2])
         touched = touched[resting[touched]]

@@ -32,7 +32,7 @@ from rigidimpulse.collision.manifold.convexity import convex_polyhedra, inner_ra
 from rigidimpulse.collision.manifold.dispatch import GENERAL, PairQuery, Posed, pair_gap
 from rigidimpulse.collision.manifold.penetrating import solids
 from rigidimpulse.collision.manifold.polyhedra import make_polyhedra
-from rigidimpulse.collision.manifold.smaller_shapes import SmallerShapes, make_smaller_shapes
+from rigidimpulse.collision.manifold.smaller_shapes import LEVELS, SmallerShapes, make_smaller_shapes
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.portable import length
 from rigidimpulse.core.quaternion import to_matrix
@@ -223,7 +223,7 @@ class ContactStepper:
         self._has_general = world.has_general_pairs
         solid_shapes, drum, inset_of_solids = solids(world.shapes, world.geometry, convex, self.shapes)
         self._deep = Deep((convex | drum)[world.shape_of_body[self.order]], solid_shapes)
-        self._convex, self._asked = Convex(self.shapes, solid_shapes, inset_of_solids), make_asked(0, n)
+        self._convex, self._asked = Convex(self.shapes, solid_shapes, inset_of_solids), make_asked(0, LEVELS * n)
         self._cornered = (world.flat & ~world.half_space)[self.order]
         self.bodies = self._make_bodies()
         self._weights = Weights(world.mass[self.order], np.ascontiguousarray(world.steady_acceleration[self.order]))
@@ -427,7 +427,7 @@ class ContactStepper:
         elif how == MORE_POINTS:
             self.table.grow(needed)
         elif how == MORE_ASKED:
-            self._asked = make_asked(2 * needed, self.world.num_bodies)
+            self._asked = make_asked(2 * needed, LEVELS * self.world.num_bodies)
         elif how == MORE_CONTACTS:
             self._buffers[0].grow(needed)
         elif how == MORE_PATCHES:
@@ -532,7 +532,7 @@ class ContactStepper:
 
     def report_crossed(self, run: Run, members: np.ndarray, time: float) -> None:
         """Report pairs of members, brought to the present, whose inset surfaces cross: the place of contact is not known any more."""
-        smaller, depth = self.smaller, self.smaller.depth
+        smaller, depth, n = self.smaller, self.smaller.depth, self.world.num_bodies
         if not depth.any():
             return
         pairs, world, now = self.table.pairs, self.world, run.state.now
@@ -541,7 +541,7 @@ class ContactStepper:
         asked = (mine[pairs.first] | mine[pairs.second]) & (depth[pairs.first] + depth[pairs.second] > 0.0)
         asked &= pairs.kind == GENERAL
         for i, j in zip(self.order[pairs.first[asked]].tolist(), self.order[pairs.second[asked]].tolist(), strict=True):
-            a, b, limit = int(smaller.of_body[i]), int(smaller.of_body[j]), CROSSED * min(self.inner[i], self.inner[j])
+            a, b, limit = int(smaller.of_body[n + i]), int(smaller.of_body[n + j]), CROSSED * min(self.inner[i], self.inner[j])
             rotation = to_matrix(now.orientation[i]), to_matrix(now.orientation[j])
             posed = Posed(a, now.position[i], rotation[0]), Posed(b, now.position[j], rotation[1])
             if pair_gap(smaller.geometry, *posed, limit, np.zeros(7)) < limit:

@@ -210,7 +210,7 @@ def _ask(island, memory, general, progress):
         progress[NEEDED] = waiting
         return MORE_ASKED
     places, margins = memory.places[:waiting], memory.margins[:waiting]
-    ask_general(general.smaller, island.bodies, memory.table.pairs, places, margins, island.order, general.asked)
+    ask_general(general.smaller, island.bodies, memory.table, places, margins, island.order, general.asked)
     progress[STAGE] = MARK
     return GOES_ON
 
