@@ -105,7 +105,7 @@ def turned_plank(gap: float, along: float) -> tuple[ri.Body, np.ndarray, np.ndar
 @pytest.mark.parametrize("along", [0.0, 0.8])
 @pytest.mark.parametrize("gap", [1e-4, -1e-4])
 def test_edges_that_cross_touch_where_they_cross(gap: float, along: float) -> None:
-    """The smaller plank is shorter by 1.2 %: 0.8 m from its middle its points are 9.6 mm off, and were moved so by its spin."""
+    """Of a plank shrunk by 1.2 % the points were 9.6 mm off 0.8 m from its middle, and its spin moved them so."""
     plank, turn, place = turned_plank(gap, along)
     ((on_plank, on_ridge, found),) = contacts_of(plank, ri.Body("ridge", ridge(), motion="static"))
     normal = np.cross(turn[:, 0], (0.0, 1.0, 0.0))
@@ -115,6 +115,25 @@ def test_edges_that_cross_touch_where_they_cross(gap: float, along: float) -> No
     between = np.linalg.lstsq(np.column_stack([turn[:, 0], (0.0, -1.0, 0.0)]), -gap * np.array([0.0, 0.0, 1.0]), rcond=None)[0]
     np.testing.assert_allclose(on_plank, place + between[0] * turn[:, 0], atol=1e-9)
     np.testing.assert_allclose(on_plank - on_ridge, found * normal, atol=1e-12)
+
+
+@pytest.mark.parametrize("gap", [1e-4, -1e-4])
+def test_faces_of_a_crystal_keep_their_normals(gap: float) -> None:
+    """An irregular hull, longer than wide, hangs from the ridge by one of its faces: less of all axes alike turns such a face by 4 mrad."""
+    corners = np.random.default_rng(5).normal(size=(16, 3)) * (0.5, 0.15, 0.1)
+    hull = trimesh.Trimesh(corners).convex_hull
+    face = int(np.argmax(hull.area_faces))
+    turn = trimesh.geometry.align_vectors(hull.face_normals[face], (0.0, 0.0, -1.0))[:3, :3] @ np.eye(3)
+    turn = trimesh.transformations.rotation_matrix(0.4, (0.0, 1.0, 0.0))[:3, :3] @ turn
+    normal = -turn @ hull.face_normals[face]
+    place = np.array([0.0, 0.2, 0.0]) + gap * normal
+    centre = place - turn @ hull.triangles_center[face]
+    q = trimesh.transformations.quaternion_from_matrix(np.block([[turn, np.zeros((3, 1))], [np.zeros((1, 3)), 1.0]]))
+    body = ri.Body("hull", ri.Shape.convex_hull(corners), position=centre, orientation=q)
+    contacts = contacts_of(body, ri.Body("ridge", ridge(), motion="static"))
+    assert contacts
+    for on_hull, on_ridge, found in contacts:
+        np.testing.assert_allclose((on_hull - on_ridge) / found, normal, atol=1e-9)
 
 
 @pytest.mark.parametrize("gap", [1e-4, -1e-4])

@@ -1,24 +1,25 @@
 """Smaller shapes for the search of contacts of bodies that may be a little inside each other.
 
 Soft contacts let bodies sink in, and the kernels of `dispatch` need bodies that are apart. So they are asked about smaller shapes with the
-same corners, edges and faces, and what they find is put back. A point of the smaller shape moves by m(p) to its place on the true one:
+same corners, edges and faces. What they find is put back: the same corner, edge or face of the true shape makes the contact.
 
-    polyhedra that are convex    shrunk about their centre of mass by 1 - SHRINK: normals stay the same
-    cylinders                    shorter by SHRINK of their radius, or of their half height if that is less, and as much of it thinner
+    polyhedra that are convex    d is taken off along each axis of the body:  x_k (1 - d / h_k),  h_k their half length along it
+    cylinders                    d is taken off at both ends and all around
     other bodies that move       inset surfaces, see `inset_surface`; their rounded parts get thinner
 
-What is convex has smaller shapes of several levels. Where a heavy body presses a light one into a mesh, it may be deeper inside than the
-first level allows. Then the next one is asked about, whose surface is d inside along each axis of the body. Before, thin boxes and rods on
-a floor that is a mesh fell through it when a heavier body landed on them.
+A point p of the smaller shape moves by m(p) to its place on the true one: m is known at corners, on an edge or in a face it is the mean
+of m at its corners there. The normal n is that of the true face, or across both true edges, else it stays. The gap is
 
-At a corner m is known, on an edge or in a face it is the mean of m at its corners there. With the normal n from a to b, gap and place are
+    g = (p_b + m_b - p_a - m_a).n
 
-    g = g' - m_a.n + m_b.n,    p = p' + (m.n) n + t.
+and the place of the contact is that of the corner or rim on what it meets, or that where two edges cross.
 
-The place across the normal, t, is that of a corner or a rim on what it meets, and that of the crossing of two edges.
+What is convex has such shapes of several d. Where a heavy body presses a light one into a mesh, it may be deeper inside than the first d
+allows. Then the next one is asked about. Before, thin boxes and rods on a floor that is a mesh fell through it when a heavier body landed
+on them.
 
 A ball, a capsule or a smaller cylinder can take up what bodies sink in. So a convex polyhedron that meets one is asked about as it is. Were
-it shrunk, a ball that rolls off the end of a plank would leave it too early, by SHRINK of the distance to the middle of the plank.
+it smaller, a ball that rolls off the end of a plank would leave it too early.
 """
 
 from __future__ import annotations
@@ -36,22 +37,25 @@ from rigidimpulse.collision.manifold.cylinder_rims import FIRST_FEATURE, NUM_FEA
 from rigidimpulse.collision.manifold.inset_surface import moved_in
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.core.vector import along, cross, dot, row, scaled, subtract, turned_back_by, turned_by
+from rigidimpulse.core.vector import along, cross, dot, length, row, scaled, subtract, turned_back_by, turned_by
 
 SHRINK = 1.5 * TOLERANCES.sub_stepping.skin
-"""Part of their lengths by which convex bodies are smaller."""
-DEEPER = (0.05, 0.2, 0.6)
-"""d of the levels after the first, as a part of the inner radius."""
-LEVELS = 2 + len(DEEPER)
-"""Shapes of each body: its own, the first smaller one, and the others."""
+"""Part of its inner radius that a body gives up at least: it may sink into the skin."""
+PARTS = (SHRINK, 0.04, 0.2, 0.6)
+"""d of the levels of what is convex, as parts of the inner radius: of cylinders beside what is convex, and of all beside meshes."""
+LEVELS = 1 + len(PARTS)
+"""Shapes of each body: its own, and smaller and smaller ones."""
+BESIDE_MESHES = 2
+"""The first level beside meshes. A corner that slides into a valley may sink into the far side before its smaller one is over that and
+finds it. With the level of SHRINK a dozen of 160 bodies fell through landscapes and funnels at "preview", with this one two did."""
 DEPTH = 0.012
 """d of inset surfaces, as a part of the radius that encloses a body."""
 ENOUGH = 2.0
 """Depths of a contact that the level which is asked about must allow: it may be as much deeper at the next look."""
 THIN = 0.25
 """Part of the radius of a ball, capsule or cylinder in a compound that d may be."""
-CROSSWISE = 0.1
-"""Sine of the angle of two edges from which the place where they cross is asked for."""
+CROSSWISE, ALIKE = 0.1, 0.9
+"""Sine of the angle of two edges from which the place where they cross is asked for; least cosine of the normal found and the true one."""
 AT_CORNER, ON_RIM, ON_CYLINDER, ON_EDGE, IN_FACE = (np.int64(where) for where in range(5))
 """Where on a body a contact is. At a corner or on a rim the body has the place of the contact, the corner before the rim."""
 ZERO = (0.0, 0.0, 0.0)
@@ -94,8 +98,8 @@ def make_smaller_shapes(
         takes_up[s] = drum or (single and one.radius >= max(SHRINK * inner[s], 1e-300))
         deeper[s] = drum or (moves[s] and convex[s])
         if deeper[s]:
-            slack[1:, s] = np.array([SHRINK, *DEEPER]) * (_radius(one) if drum else inner[s])
-            made += [(s, 1, _shrunk(one)), *((s, level, _deeper(one, slack[level, s])) for level in range(2, LEVELS))]
+            slack[1:, s] = np.array(PARTS if drum else (PARTS[1], *PARTS[1:])) * (_radius(one) if drum else inner[s])
+            made += [(s, level, _level(one, slack[level, s])) for level in range(1, LEVELS) if slack[level, s] > slack[level - 1, s]]
         elif moves[s] and (not single or len(one.faces)):
             depth[s] = d = _inset_depth(geometry, s, compiled)
             made.append((s, 1, CompiledShape(tuple(_inset(p, d) for p in compiled.primitives))))
@@ -112,17 +116,11 @@ def make_smaller_shapes(
     )
 
 
-def _shrunk(p: Primitive) -> CompiledShape:
-    """The first level of a convex polyhedron or a cylinder."""
+def _level(p: Primitive, d: float) -> CompiledShape:
+    """A convex polyhedron or a cylinder with a surface that is d m farther in along each axis of the body."""
     if p.kind == CYLINDER:
-        return CompiledShape((_shorter(p, SHRINK * _radius(p), SHRINK * p.radius),))
-    return CompiledShape((replace(p, vertices=(1.0 - SHRINK) * p.vertices),))
-
-
-def _deeper(p: Primitive, d: float) -> CompiledShape:
-    """A level of these whose surface is d m inside along each axis of the body."""
-    if p.kind == CYLINDER:
-        return CompiledShape((_shorter(p, d, d),))
+        # Not less of the radius: the prism for deep contacts, see `penetrating.SIDES`, must be farther out than this.
+        return CompiledShape((_shorter(p, d, max(d, SHRINK * p.radius)),))
     reach = np.minimum(p.vertices.max(axis=0), -p.vertices.min(axis=0))
     return CompiledShape((replace(p, vertices=p.vertices * (1.0 - d / reach)),))
 
@@ -179,65 +177,88 @@ def level_of(smaller, i, other, depth):
     """The level of the shapes about which body i is asked beside another one; depth: m, of their contacts."""
     if smaller.polyhedron[i] and smaller.takes_up[other]:
         return 0
-    level = 1
-    if smaller.deeper[i] and not smaller.deeper[other]:
-        while level + 1 < LEVELS and smaller.slack[level, i] < ENOUGH * depth:
-            level += 1
+    if not smaller.deeper[i] or smaller.deeper[other]:
+        return 1
+    level = BESIDE_MESHES
+    while level + 1 < LEVELS and smaller.slack[level, i] < ENOUGH * depth:
+        level += 1
     return level
 
 
 @jit
 def put_back(smaller, bodies, a, b, real, integer, c):
-    """Put the points of contact c of bodies a and b from the smaller shapes back to the true bodies, with its gap.
+    """Put the points of contact c of bodies a and b from the smaller shapes back to the true bodies, with its normal and gap.
 
     real (k, 10), in the world, and integer (k, 5): contacts; bodies: by their places in `smaller.of_body`.
     """
-    n = (real[c, 6], real[c, 7], real[c, 8])
-    where_a, m_a, edge_a = _moved(smaller, bodies, a, n, real, integer, c, 0)
-    where_b, m_b, edge_b = _moved(smaller, bodies, b, n, real, integer, c, 1)
-    rise_a, rise_b = dot(m_a, n), dot(m_b, n)
-    place = ZERO
-    if where_a < ON_CYLINDER and where_a < where_b:
-        place = along(m_a, -rise_a, n)
-    elif where_b < ON_CYLINDER and where_b < where_a:
-        place = along(m_b, -rise_b, n)
+    found = (real[c, 6], real[c, 7], real[c, 8])
+    where_a, p, rise_a, d_a = _true(smaller, bodies, a, found, real, integer, c, 0)
+    where_b, q, _, d_b = _true(smaller, bodies, b, found, real, integer, c, 1)
+    n = _true_normal(found, where_a, where_b, d_a, d_b)
+    gap = dot(subtract(q, p), n)
+    if where_b < ON_CYLINDER and where_b < where_a:
+        p = along(q, -gap, n)
     elif where_a == ON_EDGE and where_b == ON_EDGE:
-        place = _crossing(n, edge_a, edge_b, m_a, m_b)
+        across = cross(n, d_b)
+        sine = dot(d_a, across)
+        if sine * sine > CROSSWISE * CROSSWISE * dot(d_a, d_a) * dot(d_b, d_b):
+            p = along(p, dot(subtract(q, p), across) / sine, d_a)
+    elif not (where_a < ON_CYLINDER and where_a < where_b):
+        p = along((real[c, 0], real[c, 1], real[c, 2]), rise_a, n)
     for k in range(3):
-        real[c, k] += rise_a * n[k] + place[k]
-        real[c, 3 + k] += rise_b * n[k] + place[k]
-    real[c, 9] += rise_b - rise_a
+        real[c, k], real[c, 3 + k], real[c, 6 + k] = p[k], p[k] + gap * n[k], n[k]
+    real[c, 9] = gap
 
 
 @jit
-def _crossing(n, edge_a, edge_b, m_a, m_b):
-    """How far the place where two edges cross, seen along n, moves while they move by m_a and m_b."""
-    across_a, across_b = cross(n, edge_a), cross(n, edge_b)
-    sine_a, sine_b = dot(edge_b, across_a), dot(edge_a, across_b)
-    if sine_a * sine_a <= CROSSWISE * CROSSWISE * dot(edge_a, edge_a) * dot(edge_b, edge_b):
-        return ZERO
-    return along(scaled(edge_b, dot(m_a, across_a) / sine_a), dot(m_b, across_b) / sine_b, edge_a)
+def _true_normal(found, where_a, where_b, d_a, d_b):
+    """The normal that faces or edges of the true bodies have, or the one that was found."""
+    n = ZERO
+    if where_a == IN_FACE:
+        n = d_a
+    if where_b == IN_FACE and dot(n, n) == 0.0:
+        n = d_b
+    if where_a == ON_EDGE and where_b == ON_EDGE:
+        n = cross(d_a, d_b)
+    size = length(n)
+    along_found = dot(n, found)
+    if not abs(along_found) > ALIKE * size:
+        return found
+    return scaled(n, 1.0 / size if along_found > 0.0 else -1.0 / size)
 
 
 @jit
-def _moved(smaller, bodies, i, n, real, integer, c, side):
-    """Where on body i, the first (side 0) or second of contact c, it is; m there, and the direction of the edge it is on, in the world."""
-    geometry, x, at = smaller.geometry, bodies.position, 3 * side
-    shape = smaller.of_body[integer[c, side]]
+def _true(smaller, bodies, i, n, real, integer, c, side):
+    """Where on body i, the first (side 0) or second of contact c, it is; its place on the true body and how far that is along n.
+
+    Also the direction of the edge that it is on, or the normal of the face that it is in if that is one of a smaller shape, of any length.
+    """
+    geometry, back, x, at = smaller.geometry, smaller.back, bodies.position, 3 * side
+    shape, place = smaller.of_body[integer[c, side]], (real[c, at], real[c, at + 1], real[c, at + 2])
     where, feature = _where(geometry, shape, integer[c, 2], side, integer[c, 3 + side])
-    edge = ZERO
+    d = ZERO
     if where == ON_EDGE:
-        along_it = subtract(row(geometry.vertex, geometry.edge[feature, 1]), row(geometry.vertex, geometry.edge[feature, 0]))
-        edge = turned_by(bodies.rotation, i, along_it[0], along_it[1], along_it[2])
+        d = _true_side(geometry, back, geometry.edge[feature, 0], geometry.edge[feature, 1])
+    elif where == IN_FACE and shape >= smaller.number:
+        corner = geometry.triangle[feature]
+        d = cross(_true_side(geometry, back, corner[0], corner[1]), _true_side(geometry, back, corner[0], corner[2]))
+    d = turned_by(bodies.rotation, i, d[0], d[1], d[2])
     if shape < smaller.number:
-        return where, ZERO, edge
-    p = turned_back_by(bodies.rotation, i, real[c, at] - x[i, 0], real[c, at + 1] - x[i, 1], real[c, at + 2] - x[i, 2])
+        return where, place, 0.0, d
+    p = turned_back_by(bodies.rotation, i, place[0] - x[i, 0], place[1] - x[i, 1], place[2] - x[i, 2])
     if where == ON_CYLINDER or where == ON_RIM:
         m, thinner = _moved_on_cylinder(geometry.frame, smaller.growth, feature, p), 0.0
     else:
-        m, thinner = _mean(geometry, smaller.back, where, feature, p)
+        m, thinner = _mean(geometry, back, where, feature, p)
     m = turned_by(bodies.rotation, i, m[0], m[1], m[2])
-    return where, along(m, thinner if side == 0 else -thinner, n), edge
+    m = along(m, thinner if side == 0 else -thinner, n)
+    return where, along(place, 1.0, m), dot(m, n), d
+
+
+@jit
+def _true_side(geometry, back, i, j):
+    """From vertex i to vertex j of the true shape, in the frame of the body."""
+    return along(subtract(row(geometry.vertex, j), row(geometry.vertex, i)), 1.0, subtract(row(back, j), row(back, i)))
 
 
 @jit
