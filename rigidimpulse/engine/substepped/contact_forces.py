@@ -23,7 +23,7 @@ from rigidimpulse.collision.contact_cache import (
     note_changes,
     share_of,
 )
-from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT
+from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, SUPPORT
 from rigidimpulse.collision.contact_table import ContactTable
 from rigidimpulse.collision.contact_update import Asked, Deep, make_asked, mark_apart
 from rigidimpulse.collision.fat_boxes import BodyBounds, FatBoxes
@@ -34,8 +34,8 @@ from rigidimpulse.collision.manifold.penetrating import solids
 from rigidimpulse.collision.manifold.polyhedra import make_polyhedra
 from rigidimpulse.collision.manifold.smaller_shapes import LEVELS, SmallerShapes, make_smaller_shapes
 from rigidimpulse.core.memory import reserve
-from rigidimpulse.core.portable import length
-from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.core.portable import dot, length
+from rigidimpulse.core.quaternion import rotate, to_matrix
 from rigidimpulse.core.simd import ROW, aligned
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.workers import empty_work_queue
@@ -513,22 +513,41 @@ class ContactStepper:
             self._make_space(how, int(progress[NEEDED]))
 
     def inside_others(self, run: Run, asked: np.ndarray) -> np.ndarray:
-        """Which bodies (n,) bool of those asked for, brought to the present, have true surfaces inside others, where theirs are inset.
+        """Which bodies (n,) bool of those asked for, brought to the present, are inside others: the exact regime must not get them.
 
-        Exact contact cannot find such a pair again: it took a ring that lay 10 um inside a floor for one that is past it.
+        It moves bodies apart at once that are deep inside each other: a ball that was 3 mm inside a box pushed that through the ground. And
+        it cannot find surfaces that cross: it took a ring that lay 10 um inside a floor for one that is past it.
         """
         out = np.zeros(self.world.num_bodies, bool)
-        depth = self.smaller.depth
-        if not (depth.any() and asked.any()):
+        if not asked.any():
             return out
-        pairs, world, now = self.table.pairs, self.world, run.state.now
-        mine = asked[self.order]
+        pairs, depth, mine = self.table.pairs, self.smaller.depth, asked[self.order]
+        which = np.flatnonzero((mine[pairs.first] | mine[pairs.second]) & (pairs.count > 0))
+        p, gap = self._gaps(which)
+        deep = p[gap < -np.minimum(self.bodies.skin[pairs.first[p]], self.bodies.skin[pairs.second[p]])]
+        out[self.order[np.append(pairs.first[deep], pairs.second[deep])]] = True
+        out &= asked
+        if not depth.any():
+            return out
+        world, now = self.world, run.state.now
         which = (mine[pairs.first] | mine[pairs.second]) & (depth[pairs.first] + depth[pairs.second] > 0.0)
         for i, j in zip(self.order[pairs.first[which]].tolist(), self.order[pairs.second[which]].tolist(), strict=True):
             posed = [Posed(int(world.shape_of_body[k]), now.position[k], to_matrix(now.orientation[k])) for k in (i, j)]
             if pair_gap(world.geometry, posed[0], posed[1], self.skin[[i, j]].min(), np.zeros(7)) <= 0.0:
                 out[[i, j]] = asked[[i, j]]
         return out
+
+    def _gaps(self, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gaps (c,) m of all contact points of pairs (k,) as the bodies are now, and whose they are (c,)."""
+        pairs, bodies = self.table.pairs, self.bodies
+        p = np.repeat(which, pairs.count[which])
+        begins = np.repeat(pairs.start[which] - (np.cumsum(pairs.count[which]) - pairs.count[which]), pairs.count[which])
+        points = self.table.points[begins + np.arange(len(p))]
+        a, b, q = pairs.first[p], pairs.second[p], bodies.orientation
+        from_a = bodies.position[a] + rotate(q[a], points[:, SKELETON_A : SKELETON_A + 3])
+        from_b = bodies.position[b] + rotate(q[b], points[:, SKELETON_B : SKELETON_B + 3])
+        normal = rotate(q[np.where(pairs.carrier[p], b, a)], points[:, :3])
+        return p, dot(from_b - from_a, normal) - points[:, ROUND_A] - points[:, ROUND_B]
 
     def report_crossed(self, run: Run, members: np.ndarray, time: float) -> None:
         """Report pairs of members, brought to the present, whose inset surfaces cross: the place of contact is not known any more."""
