@@ -32,8 +32,9 @@ import numpy as np
 
 from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, CompiledShape, Geometry, Primitive, build_geometry, joined
-from rigidimpulse.collision.manifold.convexity import convex_polyhedra, inner_radii
+from rigidimpulse.collision.manifold.convexity import convex_polyhedra, inner_radii, several_polyhedra
 from rigidimpulse.collision.manifold.cylinder_rims import FIRST_FEATURE, NUM_FEATURES, RIM
+from rigidimpulse.collision.manifold.dispatch import MOST_HULL_CORNERS
 from rigidimpulse.collision.manifold.inset_surface import moved_in
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.tolerances import TOLERANCES
@@ -91,29 +92,58 @@ def make_smaller_shapes(
     """
     number, convex, inner = len(shapes), convex_polyhedra(geometry, depths), inner_radii(geometry, depths)
     depth, takes_up, deeper, made = np.zeros(number), np.zeros(number, bool), np.zeros(number, bool), []
-    slack, taken_off = np.zeros((LEVELS, number)), np.zeros((LEVELS, number))
+    slack, taken_off, shape = np.zeros((LEVELS, number)), np.zeros((LEVELS, number)), np.tile(np.arange(number), (LEVELS, 1))
     for s, compiled in enumerate(shapes):
         one, single = compiled.primitives[0], len(compiled.primitives) == 1
-        drum = single and one.kind == CYLINDER
-        takes_up[s] = drum or (single and one.radius >= max(SHRINK * inner[s], 1e-300))
-        deeper[s] = drum or (moves[s] and convex[s])
-        if deeper[s]:
-            slack[1:, s] = np.array(PARTS if drum else (PARTS[1], *PARTS[1:])) * (_radius(one) if drum else inner[s])
+        takes_up[s] = single and (one.kind == CYLINDER or one.radius >= max(SHRINK * inner[s], 1e-300))
+    drums = takes_up & (geometry.kind[geometry.shape_first[:-1]] == CYLINDER)
+    asked = _asked_beside_others(geometry, convex, takes_up)
+    for s, compiled in enumerate(shapes):
+        one, single = compiled.primitives[0], len(compiled.primitives) == 1
+        deeper[s] = drums[s] or (moves[s] and convex[s])
+        if drums[s] or (deeper[s] and asked):
+            slack[1:, s] = np.array(PARTS if drums[s] else (PARTS[1], *PARTS[1:])) * (_radius(one) if drums[s] else inner[s])
             made += [(s, level, _level(one, slack[level, s])) for level in range(1, LEVELS) if slack[level, s] > slack[level - 1, s]]
-        elif moves[s] and (not single or len(one.faces)):
+        elif not deeper[s] and moves[s] and (not single or len(one.faces)):
             depth[s] = d = _inset_depth(geometry, s, compiled)
             made.append((s, 1, CompiledShape(tuple(_inset(p, d) for p in compiled.primitives))))
     everything = joined(geometry, build_geometry([smaller for _, _, smaller in made])) if made else geometry
     back, growth = _lost(geometry, everything, made)
-    shape = np.tile(np.arange(number), (LEVELS, 1))
     for k, (s, level, _) in enumerate(made):
         shape[level:, s] = number + k
         taken_off[level:, s] = depth[s] if depth[s] > 0.0 else _most_taken_off(everything, back, growth, number + k)
+    if not asked:
+        # One level, and no new trees and normals: these take long for many hulls.
+        alike, behind = np.flatnonzero(deeper & ~drums), len(everything.vertex)
+        shape[1:, alike], slack[1:, alike] = number + len(made) + alike, SHRINK * inner[alike]
+        everything = joined(everything, _shrunk(geometry))
+        back = np.pad(back, ((0, len(everything.vertex) - behind), (0, 0)))
+        growth = np.pad(growth, ((0, len(everything.kind) - len(growth)), (0, 0)))
+        back[behind:, :3] = SHRINK * geometry.vertex
+        for s in alike.tolist():
+            taken_off[1:, s] = _most_taken_off(everything, back, growth, int(shape[1, s]))
     own = of_body[order]
     taken_off, slack = np.ascontiguousarray(taken_off[:, own]), np.ascontiguousarray(slack[:, own])
     return SmallerShapes(
         everything, number, shape[:, of_body].ravel(), back, growth, taken_off, slack, depth[own], convex[own], deeper[own], takes_up[own]
     )
+
+
+def _asked_beside_others(geometry: Geometry, convex: np.ndarray, takes_up: np.ndarray) -> bool:
+    """Whether polyhedra (s,) bool meet shapes beside which they are asked about as smaller ones: meshes, or polyhedra of many corners."""
+    half_space = geometry.kind[geometry.shape_first[:-1]] == HALF_SPACE
+    known = convex | takes_up | half_space | several_polyhedra(geometry)
+    return not known.all() or int(np.diff(geometry.vertex_first).max(initial=0)) > MOST_HULL_CORNERS
+
+
+def _shrunk(geometry: Geometry) -> Geometry:
+    """All shapes shrunk about the centres of mass of their bodies."""
+    f = 1.0 - SHRINK
+    frame = geometry.frame * [f, f, f, 1.0, 1.0, 1.0, f]
+    return geometry._replace(
+        vertex=f * geometry.vertex, frame=frame, radius=f * geometry.radius, node_min=f * geometry.node_min, node_max=f * geometry.node_max,
+        bound_centre=f * geometry.bound_centre, bound_radius=f * geometry.bound_radius,
+    )  # fmt: skip
 
 
 def _level(p: Primitive, d: float) -> CompiledShape:
