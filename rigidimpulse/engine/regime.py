@@ -8,8 +8,9 @@ The exact regime is more accurate, so it is used wherever it can be afforded. "a
                 Bodies at rest take 2 to 4 solves, a fall of boxes 10 to 20; each takes about as long as a step of a small
                 sub-stepped island
     or joints   an island with joints that something is near, each body of which the exact regime solved more than EXPENSIVE_SOLVES
-                times a step, in the mean of the last ones. Where nothing is near it EXPENSIVE_SWING times, by as much less often as
-                it has more bodies than SMALL. A body that hangs alone stays exact, and so does what rolling friction may act on
+                times a step, in the mean of the last ones; EXPENSIVE_JOINTED times where it has less than FEW bodies: a door on a soft
+                hinge takes up to 9 though it touches nothing. Where nothing is near it EXPENSIVE_SWING times, by as much less often
+                as it has more bodies than SMALL. A body that hangs alone stays exact, and so does what rolling friction may act on
     or runaway  in the middle of a step, an island of which a body was solved more than RUNAWAY times in the step, or by as much less
                 often as it has more bodies than LARGE: it costs more than it advances. So do islands in which two bodies come to contact
                 again and again and no impulse keeps them apart. They are handed over at that instant, whatever they are made of.
@@ -46,7 +47,7 @@ MANY, SOME, FEW, KEPT = 60, 12, 8, 2
 ASK = -1.0
 """`SolveCounts.most` where it is asked at every step whether islands begin to be sub-stepped."""
 EXPENSIVE_SOLVES, EXPENSIVE_TALL = 6.0, 16.0
-EXPENSIVE_SWING, SMALL = 300.0, 8.0
+EXPENSIVE_JOINTED, EXPENSIVE_SWING, SMALL = 16.0, 300.0, 8.0
 RATIO, REBOUND, ELASTIC, TALL = 30.0, 0.5, 0.9, 12
 CROWD, PAIRS = 128, 4.0
 FAST, SPIN = 0.5, 2.5 / 16.0
@@ -217,7 +218,7 @@ def refusals(
     for r in np.flatnonzero((size > 0) & (size < least) & ~has_joints).tolist():
         out[r] = "few bodies"
     swings = EXPENSIVE_SWING / np.maximum(size / SMALL, 1.0)
-    cheap = solves <= np.where(touches, EXPENSIVE_SOLVES, swings)
+    cheap = solves <= np.where(touches, np.where(size < FEW, EXPENSIVE_JOINTED, EXPENSIVE_SOLVES), swings)
     # Sub-steps have no rolling friction.
     stays_exact = np.full(len(root), True) if world.rolling.size else cheap | (size < KEPT)
     for r in np.flatnonzero(has_joints & ~was_substepped & stays_exact).tolist():
