@@ -16,6 +16,7 @@ import numpy as np
 
 from rigidimpulse.collision.containment import points_inside
 from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
+from rigidimpulse.collision.segment_crossings import crossings
 from rigidimpulse.collision.time_of_impact import bisection
 from rigidimpulse.collision.time_of_impact.result import PairsToSweep
 from rigidimpulse.core.union_find import roots
@@ -143,6 +144,7 @@ def _respond_and_detect(run: Run) -> None:
     pair_events.count_contacts(0.0)
     _take_steps(run)
     points_inside(run.world.geometry, 1, np.zeros((1, 3)))
+    crossings(run.world.geometry, 1, np.zeros((1, 3)), np.ones((1, 3)))
 
 
 def _held(run: Run, contacts: Contacts) -> tuple[ContactProblem, Turning]:

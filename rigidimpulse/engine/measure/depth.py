@@ -13,6 +13,8 @@ function along what is left, and the largest of the depths at both ends and in t
 polyhedra are inside each other if and only if an edge of one enters the other; equal boxes may have all of them in each other's faces, so
 there are the lines to the middles of faces, too. A ball outside a face is as deep as r - h, h its height above the face, if its foot lies
 in the face; a ball whose foot is beside it is found by the edges of the polyhedron.
+
+Points inside a shape, with a lower bound of their depth in it, are for the check of ways through surfaces, see `tunnelling`.
 """
 
 from __future__ import annotations
@@ -51,6 +53,14 @@ SAME_PLANE: float = 1e-6
 """Difference of unit normals, and of offsets over the size, up to which two faces are in one plane."""
 DEEPEST: int = 3
 """Points inside a surface whose depth is computed: those that are farthest from its corners."""
+OFF_MIDDLE = np.array([0.123, 0.271, 0.191])
+"""Place of a point, of its depth, beside the middle of its body: bodies that start above a corner of a grid would meet no triangle."""
+MOST_POINTS: int = 8
+"""Points of a body that are looked at, evenly chosen of its parts."""
+MOST_TRIED: int = 96
+"""Faces of a closed surface, evenly chosen, below which a point inside is looked for."""
+HALVINGS: int = 8
+"""Heights below a face that are tried, each half of the one before; the first is half the size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +83,7 @@ class Solid:
     cylinders: list[Primitive]
     hollow: list[Primitive]  # surfaces that are not convex, or open
     surface: np.ndarray  # (t, 3, 3) m, triangles of closed surfaces that are not convex
-    middles: np.ndarray  # (t, 4) m, of these triangles, and how far their corners are
+    middles: np.ndarray  # (4, t) m, of these triangles, and how far their corners are
     inside: tuple[Geometry, int] | None  # compiled shape of these surfaces
     bounds: np.ndarray  # (m, 4) planes behind which the shape is
 
@@ -120,7 +130,7 @@ def probe_of(shape: CompiledShape) -> Probe:
 @kept_with_argument
 def solid_of(shape: CompiledShape) -> Solid:
     """What of a shape may be entered; open surfaces may not, and others only as part of a `whole_solid`."""
-    solid = Solid([], [], [], [], [], np.zeros((0, 3, 3)), np.zeros((0, 4)), None, _bounds(shape))
+    solid = Solid([], [], [], [], [], np.zeros((0, 3, 3)), np.zeros((4, 0)), None, _bounds(shape))
     for primitive, faces in zip(shape.primitives, _planes_of(shape), strict=True):
         if primitive.kind == HALF_SPACE:
             solid.convex.append(primitive.frame[None, :4])
@@ -146,9 +156,7 @@ def whole_solid(solid: Solid, shape: CompiledShape, geometry: Geometry, index: i
     if len(solid.hollow) < len(shape.primitives):
         geometry, index = build_geometry([CompiledShape(tuple(solid.hollow))]), 0
     surface = np.concatenate([p.vertices[p.faces] for p in solid.hollow])
-    middle = surface.mean(axis=1)
-    farthest = np.linalg.norm(surface - middle[:, None], axis=2).max(axis=1)
-    return replace(solid, surface=surface, middles=np.column_stack([middle, farthest]), inside=(geometry, index))
+    return replace(solid, surface=surface, middles=middles_of(surface), inside=(geometry, index))
 
 
 def surely_apart(corners: np.ndarray, bounds: np.ndarray, posed: Posed) -> np.ndarray:
@@ -289,20 +297,68 @@ def _depth_in_surface(solid: Solid, points: np.ndarray, radii: np.ndarray) -> np
             far = np.linalg.norm(centres[chosen, None] - corners[None, :: max(len(corners) // MOST_EDGES, 1)], axis=2).min(axis=1)
             chosen = chosen[np.argsort(np.where(inside[chosen], -far, far), kind="stable")[:DEEPEST]]
         for k in chosen.tolist():
-            distance = _distance_from_surface(solid, centres[k])
+            distance = distance_from_triangles(solid.surface, solid.middles, centres[k])
             depth[c] = max(depth[c], r[k] + distance if inside[k] else r[k] - distance)
     return depth
 
 
-def _distance_from_surface(solid: Solid, point: np.ndarray) -> float:
-    """Distance of a point (3,) from the triangles of a solid, m."""
+@kept_with_argument
+def inner_points(shape: CompiledShape) -> np.ndarray:
+    """Points inside a shape, and how deep they are in it, (k, 4) m; points of open surfaces have no depth."""
+    points = [_point_in(primitive, planes) for primitive, planes in zip(shape.primitives, _planes_of(shape), strict=True)]
+    points = [point for point in points if point is not None]
+    return np.array(points[:: -(-len(points) // MOST_POINTS)]).reshape(-1, 4) if points else np.zeros((0, 4))
+
+
+def _point_in(primitive: Primitive, planes: np.ndarray | None) -> np.ndarray | None:
+    """A point (4,) in a primitive, and its depth; None in half spaces, which others are above or inside."""
+    if primitive.kind == HALF_SPACE:
+        return None
+    if primitive.kind == CYLINDER:
+        middle, rho = primitive.frame[:3], min(primitive.radius, float(primitive.frame[6]))
+    elif not len(primitive.faces):
+        middle, rho = primitive.vertices.mean(axis=0), primitive.radius
+    elif planes is not None:
+        middle = primitive.vertices.mean(axis=0)
+        rho = float((planes[:, 3] - planes[:, :3] @ middle).min())
+    else:
+        return _point_in_surface(primitive)
+    beside = OFF_MIDDLE * rho
+    return np.array([*(middle + beside), rho - float(np.linalg.norm(beside))])
+
+
+def _point_in_surface(primitive: Primitive) -> np.ndarray:
+    """The same of a surface that is not convex: below the middle of a face; on it if nothing is inside."""
+    triangles = primitive.vertices[primitive.faces]
+    chosen = slice(None, None, -(-len(triangles) // MOST_TRIED))
+    middle, normal = triangles[chosen].mean(axis=1), _normals(primitive)[chosen]
+    geometry, size = build_geometry([CompiledShape((primitive,))]), float(np.ptp(primitive.vertices, axis=0).max())
+    for height in 0.5 ** np.arange(1, HALVINGS + 1) * size:
+        below = middle - height * normal
+        below = below[points_inside(geometry, 0, below)]
+        if len(below):
+            depths = [distance_from_triangles(triangles, middles_of(triangles), point) for point in below]
+            return np.array([*below[int(np.argmax(depths))], max(depths)])
+    return np.array([*middle[0], 0.0])
+
+
+def middles_of(triangles: np.ndarray) -> np.ndarray:
+    """Coordinates of the middles of triangles (t, 3, 3), and how far their corners are from them, (4, t) m."""
+    middle = triangles.mean(axis=1)
+    return np.vstack([middle.T, np.linalg.norm(triangles - middle[:, None], axis=2).max(axis=1)])
+
+
+def distance_from_triangles(triangles: np.ndarray, middles: np.ndarray, point: np.ndarray) -> float:
+    """Distance of a point (3,) from triangles (t, 3, 3), m; middles: of them, see `middles_of`."""
     # With trimesh comes half a second of imports, which the first picture of simple shapes need not wait for.
     from trimesh.triangles import closest_point
 
-    from_middles = np.linalg.norm(solid.middles[:, :3] - point, axis=1)
+    # One coordinate after the other: along an axis of three numpy takes ten times as long.
+    x, y, z = (middles[k] - point[k] for k in range(3))
+    from_middles = np.sqrt(x * x + y * y + z * z)
     # Middles are points of the surface: no triangle that is farther away than the nearest of them counts.
-    surface = solid.surface[from_middles - solid.middles[:, 3] <= from_middles.min()]
-    nearest = closest_point(surface, np.broadcast_to(point, (len(surface), 3)))
+    near = triangles[from_middles - middles[3] <= from_middles.min()]
+    nearest = closest_point(near, np.broadcast_to(point, (len(near), 3)))
     return float(np.linalg.norm(nearest - point, axis=1).min())
 
 

@@ -12,6 +12,7 @@ from rigidimpulse.engine.measure.energy_taken import energy_taken_faults
 from rigidimpulse.engine.measure.momentum import momentum_faults
 from rigidimpulse.engine.measure.overlap import overlap_faults
 from rigidimpulse.engine.measure.record import Fault, RunRecord
+from rigidimpulse.engine.measure.tunnelling import tunnelling_faults
 from rigidimpulse.engine.regime import jointed
 from rigidimpulse.model.world import World
 from rigidimpulse.recording.events import EventLog
@@ -56,8 +57,8 @@ def measured_faults(record: RunRecord) -> list[Fault]:
     frames = record.frames
     if len(frames.times) < 2 or not all(np.isfinite(part).all() for part in frames):
         return []
-    faults = energy_faults(record) + energy_taken_faults(record) + momentum_faults(record) + overlap_faults(record)
-    return sorted(faults, key=lambda fault: fault.time)
+    measures = (energy_faults, energy_taken_faults, momentum_faults, overlap_faults, tunnelling_faults)
+    return sorted((fault for measure in measures for fault in measure(record)), key=lambda fault: fault.time)
 
 
 def report_measured(record: RunRecord, log: EventLog) -> None:
