@@ -142,6 +142,14 @@ def _motion(seen, p, is_round, reach, place, turn):
 
 
 @inlined
+def moved_since_seen(bodies, pairs, p):
+    """How far points of a pair have moved past each other at most since its contacts were found, m."""
+    carrier, other = (pairs.second[p], pairs.first[p]) if pairs.carrier[p] else (pairs.first[p], pairs.second[p])
+    place, turn = _relative_pose(bodies.position, bodies.orientation, bodies.rotation, carrier, other)
+    return _motion(pairs.seen, p, pairs.round[p], bodies.reach[other], place, turn)
+
+
+@inlined
 def note_seen(bodies, pairs, p):
     """Store the present relative pose of a pair."""
     a, b = pairs.first[p], pairs.second[p]
@@ -162,9 +170,7 @@ def _can_meet(bodies, pairs, p, far):
         return False
     if not pairs.known[p] or pairs.count[p] > 0:
         return True
-    carrier, other = (b, a) if pairs.carrier[p] else (a, b)
-    place, turn = _relative_pose(x, bodies.orientation, bodies.rotation, carrier, other)
-    return pairs.apart[p] - _motion(pairs.seen, p, pairs.round[p], bodies.reach[other], place, turn) <= far
+    return pairs.apart[p] - moved_since_seen(bodies, pairs, p) <= far
 
 
 @inlined

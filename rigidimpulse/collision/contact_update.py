@@ -10,18 +10,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rigidimpulse.collision.contact_cache import note_seen
+from rigidimpulse.collision.contact_cache import moved_since_seen, note_seen
 from rigidimpulse.collision.contact_matching import NEAR, Points, Source, match_contacts, set_contact_margin, write_point
 from rigidimpulse.collision.contact_records import ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, SKIN
 from rigidimpulse.collision.manifold.dispatch import Posed, pair_gap
-from rigidimpulse.collision.manifold.penetrating import gap_along, overlap_contacts
+from rigidimpulse.collision.manifold.penetrating import gap_along, overlap_contacts, support
 from rigidimpulse.collision.manifold.polyhedra import POINTS, Polyhedra, make_scratch
 from rigidimpulse.collision.manifold.polyhedra import Points as Found
 from rigidimpulse.collision.manifold.reduce import GAP_WEIGHT, PER_NORMAL, reduce_contacts
 from rigidimpulse.collision.manifold.rounding import only_primitive, side_radius
 from rigidimpulse.collision.manifold.smaller_shapes import level_of, put_back
 from rigidimpulse.core.kernels import jit, jit_making_arrays
-from rigidimpulse.core.vector import turned_by
+from rigidimpulse.core.vector import along, dot, row, turned_by
 
 FARTHER = 1.5
 """Distance of the search in margins: a pair without contacts is then known to be apart for some time."""
@@ -81,13 +81,28 @@ def _gap_now(bodies, pairs, p, point):
 
 
 @jit
-def _deepest(bodies, table, p):
-    """How deep the bodies of a pair are inside each other at the contacts that it had, m; 0 if they are not."""
+def _deepest(smaller, bodies, table, p):
+    """How deep the bodies of a pair may be inside each other, m: at the contacts that it had, and at others with the same normals.
+
+    Where a flat body wobbles, other corners or points of its rim are the lowest by now: such bodies lost all contacts on a floor that is a
+    mesh. So the support s(n) of the body in the plane of each contact counts, up to how far the pair has moved since the last look.
+    """
     pairs, points, _, _ = table
-    deepest = 0.0
+    a, b = pairs.first[p], pairs.second[p]
+    deepest, sunk = 0.0, 0.0
+    # Only beside what is not convex do smaller shapes have more levels.
+    is_first, is_one = smaller.deeper[a], smaller.deeper[a] != smaller.deeper[b]
+    i, other, at, sign = (a, b, SKELETON_B, 1.0) if is_first else (b, a, SKELETON_A, -1.0)
+    primitive = smaller.geometry.shape_first[bodies.shape[i]]
     for r in range(pairs.start[p], pairs.start[p] + pairs.count[p]):
-        deepest = max(deepest, -_gap_now(bodies, pairs, p, points[r])[0])
-    return deepest
+        point = points[r]
+        gap, nx, ny, nz = _gap_now(bodies, pairs, p, point)
+        deepest, n = max(deepest, -gap), (nx, ny, nz)
+        if is_one:
+            on = turned_by(bodies.rotation, other, point[at], point[at + 1], point[at + 2])
+            plane = sign * dot(along(on, 1.0, row(bodies.position, other)), n) - point[ROUND_B if is_first else ROUND_A]
+            sunk = max(sunk, support(smaller.geometry, primitive, bodies.position[i], bodies.rotation[i], n, sign) - plane)
+    return max(deepest, min(sunk, deepest + moved_since_seen(bodies, pairs, p))) if sunk > deepest else deepest
 
 
 @jit
@@ -101,7 +116,7 @@ def ask_general(smaller, bodies, table, places, margins, order, asked):
         first, second = table.pairs.first[places[k]], table.pairs.second[places[k]]
         # A wide margin is expensive for meshes.
         far = margins[k] if depth[first] + depth[second] > 0.0 else FARTHER * margins[k]
-        deepest = _deepest(bodies, table, places[k])
+        deepest = _deepest(smaller, bodies, table, places[k])
         level_first, level_second = level_of(smaller, first, second, deepest), level_of(smaller, second, first, deepest)
         asked.a[k], asked.b[k] = order[first] + n * level_first, order[second] + n * level_second
         asked.far[k] = far

@@ -27,6 +27,8 @@ from contact_scenes import (
 )
 from scipy.spatial.transform import Rotation
 
+from rigidimpulse.collision.geometry import ROUND, Primitive
+
 
 class TestFaces:
     scene = Scene(mesh(box()), mesh(box(1.4, 0.8, 1.0)))
@@ -190,6 +192,39 @@ def test_vertex_beside_an_edge_or_a_vertex(gap, tip):
 
 
 class TestConcave:
+    @pytest.mark.parametrize("is_closed", [True, False])
+    @pytest.mark.parametrize("side", [1.0, -1.0])
+    def test_a_corner_near_the_bottom_of_a_valley_meets_both_slopes(self, side, is_closed):
+        """A cube on edge over one slope, `before` m from the bottom: its foot on the other slope's plane is not on that slope."""
+        slope, before, height, margin = 0.6, 0.02, 1e-3, 0.05
+        n = np.array([[-slope, 0.0, 1.0], [slope, 0.0, 1.0]]) / np.hypot(1.0, slope)
+        solid = prism([(-2.0, -1.0), (2.0, -1.0), (2.0, 2.0 * slope), (0.0, 0.0), (-2.0, 2.0 * slope)], 4.0)
+        surface = mesh(solid)
+        if not is_closed:
+            upper = np.asarray(solid.face_normals)[:, 2] * np.abs(np.asarray(solid.face_normals)[:, 0]) > 0.1
+            surface = Primitive(ROUND, vertices=surface.vertices, faces=surface.faces[upper])
+        on, other = (n[0], n[1]) if side > 0 else (n[1], n[0])
+        down = np.array([-side, 0.0, -slope]) / np.hypot(1.0, slope)
+        scene = Scene(surface, mesh(box()))
+        # The lowest edge of the cube runs along y, its two faces lean by 45 degrees to the vertical.
+        R = turn((0, 1, 0), np.pi / 4)
+        lowest = height * on - before * down
+        position = lowest + np.array([0.0, 0.0, 0.5**0.5])
+        contacts = scene.contacts(IDENTITY, (position, R), margin).check()
+        gaps = {1: float(lowest @ on), 2: float(lowest @ other)}
+        assert gaps[2] > 0.01
+        for expected, wanted in ((on, gaps[1]), (other, gaps[2])):
+            mine = contacts.normal @ expected > 1.0 - 1e-12
+            assert mine.sum() == 2 and np.allclose(contacts.gap[mine], wanted, rtol=0, atol=ROUND_OFF)
+            assert np.allclose(np.sort(contacts.point_b[mine][:, 1]), [-0.5, 0.5])
+        # Farther from the bottom than the margin only its own slope counts.
+        far = scene.contacts(IDENTITY, (position - (margin - before + 0.01) * down, R), margin)
+        assert np.all(far.normal @ on > 1.0 - 1e-12) and len(far) == 2
+        # From the back of an open surface the valley is a ridge: nothing is beyond it.
+        if not is_closed:
+            below = -0.01 * on - before * down - np.array([0.0, 0.0, 0.5**0.5])
+            assert not np.any(np.abs(scene.contacts(IDENTITY, (below, R), margin).normal @ other) > 1.0 - 1e-12)
+
     @pytest.mark.parametrize("gap", [(1e-3, 4e-4), (1e-6, 1e-6), (1e-9, 3e-10)])
     def test_cube_in_a_notch_touches_both_walls(self, gap):
         rng = np.random.default_rng(5)

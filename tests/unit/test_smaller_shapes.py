@@ -9,7 +9,8 @@ import trimesh
 import rigidimpulse as ri
 from rigidimpulse.collision.contact_records import CONTACT_MARGIN, SEPARATION, SKELETON_A, SKELETON_B
 from rigidimpulse.collision.geometry import build_geometry, compile_shape
-from rigidimpulse.collision.manifold.smaller_shapes import DEPTH, make_smaller_shapes
+from rigidimpulse.collision.manifold.make_smaller_shapes import DEPTH, make_smaller_shapes
+from rigidimpulse.collision.manifold.smaller_shapes import BESIDE_MESHES, PARTS
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.run import Run
@@ -54,6 +55,44 @@ def test_what_is_thinner_than_twice_the_depth_does_not_turn_inside_out() -> None
     sheet = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
     true, inset, _ = inset_of(Shape.mesh(sheet, [(0, 1, 2), (0, 2, 3)]))
     np.testing.assert_array_equal(inset, true)
+
+
+def levels_of(shape: Shape) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    """d, triangles (t, 3, 3), and those of the smaller shape, of each level that a convex polyhedron has beside a sheet."""
+    sheet = Shape.mesh(np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float), [(0, 1, 2), (0, 2, 3)])
+    scene = ri.Scene(bodies=[ri.Body("sheet", sheet, motion="static"), ri.Body("body", shape, position=(0, 0, 9))])
+    world = compile_scene(scene)
+    moves, own = np.zeros(len(world.shapes), bool), int(world.shape_of_body[1])
+    moves[own] = True
+    smaller = make_smaller_shapes(world.shapes, world.geometry, world.convex_depths, moves, world.shape_of_body, np.arange(2))
+    true, levels = world.shapes[own].primitives[0], []
+    for level, number in enumerate(smaller.of_body.reshape(-1, 2)[:, 1].tolist()):
+        first = smaller.geometry.vertex_first[smaller.geometry.shape_first[number]]
+        levels.append((float(smaller.slack[level, 1]), true.vertices[true.faces], smaller.geometry.vertex[first:][true.faces]))
+    return levels[BESIDE_MESHES:]
+
+
+@pytest.mark.parametrize("flat", [1.0, 0.2, 0.04])
+@pytest.mark.parametrize("seed", range(6))
+def test_levels_of_hulls_are_inside_them(seed: int, flat: float) -> None:
+    """All faces are d farther in, and nothing comes out, though the faces are at any angle to the axes.
+
+    With d / h_k along the axes corners of flat hulls came out of them, and no contact was found for what they were inside of.
+    """
+    hull = Shape.convex_hull(np.random.default_rng(seed).normal(size=(14, 3)) * [1.0, 0.8, flat])
+    levels = levels_of(hull)
+    assert len(levels) == len(PARTS) - 1
+    for d, true, small in levels:
+        normal = np.cross(true[:, 1] - true[:, 0], true[:, 2] - true[:, 0])
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        assert np.all(np.einsum("tki,ti->tk", true - small, normal) >= d * (1.0 - 1e-6))
+        height = np.einsum("vi,ti->vt", small.reshape(-1, 3), normal) - np.einsum("ti,ti->t", true[:, 0], normal)
+        assert np.all(height <= -d * (1.0 - 1e-6))
+
+
+def test_levels_of_a_box_lose_the_same_on_all_sides() -> None:
+    for d, true, small in levels_of(Shape.box((1.0, 0.3, 0.1))):
+        np.testing.assert_allclose(np.abs(true) - np.abs(small), d, rtol=1e-12)
 
 
 VALLEY = np.array([(-1.0, -0.5), (1.0, -0.5), (1.0, 0.0), (0.5, -0.2), (0.0, 0.0), (-0.5, -0.2), (-1.0, 0.0)])

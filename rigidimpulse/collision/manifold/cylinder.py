@@ -83,7 +83,7 @@ def cylinder_half_space_contacts(geometry, cylinder, half_space, pose, margin, c
     solid = solid_of(geometry.frame, geometry.radius, cylinder, margin)
     m, a = _plane(geometry, solid, half_space, pose)
     found = Found(contacts.real, contacts.integer, count)
-    return rims_on_plane(solid, found, count, m, (a, a, a), WHOLE_PLANE, half_space)
+    return rims_on_plane(solid, found, count, (m, (a, a, a), ZERO), WHOLE_PLANE, half_space)
 
 
 @inner
@@ -120,7 +120,7 @@ def cylinder_cylinder_contacts(geometry, first, second, pose, margin, contacts, 
             outward, across = along(ZERO, sign, axis), along(ZERO, sign, y)
             middle = along(centre, other.half, outward)
             cap, rim = other.feature + CAP + bottom, other.feature + RIM + bottom
-            count = rims_on_plane(solid, found, count, outward, (middle, middle, middle), other.radius, cap)
+            count = rims_on_plane(solid, found, count, (outward, (middle, middle, middle), ZERO), other.radius, cap)
             for target in range(-1, 2 - 2 * turn):  # the side; in the first turn both rims as well
                 count = circle_contacts(solid, found, count, (middle, x, across, other.radius), target, rim)
         solid, other = other, solid

@@ -107,12 +107,13 @@ def write_points(solid, p, q, out):
 
 
 @inner
-def rims_on_plane(solid, found, count, m, corners, bound, other):
-    """Append the contacts of both rims with a plane through `a`, unit normal m out of the other body.
+def rims_on_plane(solid, found, count, plane, bound, other):
+    """Append the contacts of both rims with a plane (m, (a, b, c), beyond) through `a`, unit normal m out of the other body.
 
-    The plane is bounded by the triangle `corners` = (a, b, c) (`bound` TRIANGLE) or a circle of radius `bound` about a.
+    The plane is bounded by the triangle a, b, c (`bound` TRIANGLE), with `beyond` (3) m more at its sides, or a circle of radius `bound`
+    about a.
     """
-    a, b, c = corners
+    m, (a, b, c), beyond = plane
     radius, half, margin = solid.radius, solid.half, solid.margin
     border = BORDER * (radius + half)
     deepest = -inf if bound == WHOLE_PLANE else -solid.depth
@@ -138,7 +139,7 @@ def rims_on_plane(solid, found, count, m, corners, bound, other):
                 continue
             q = along(p, -gap, m)
             if bound == TRIANGLE:
-                if not over_triangle(q, a, b, c, m, border, border, border):
+                if not over_triangle(q, a, b, c, m, border + beyond[0], border + beyond[1], border + beyond[2]):
                     continue
             elif bound < WHOLE_PLANE and dot(subtract(q, a), subtract(q, a)) > (bound + border) ** 2:
                 continue

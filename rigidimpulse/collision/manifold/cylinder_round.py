@@ -24,6 +24,7 @@ from rigidimpulse.collision.manifold.cylinder_rims import (
     solid_of,
     write_points,
 )
+from rigidimpulse.collision.manifold.near_features import across_valley
 from rigidimpulse.core.vector import along, dot, row, subtract
 
 
@@ -151,8 +152,10 @@ def cylinder_round_contacts(geometry, cylinder, round_, pose, margin, contacts, 
                 # An open surface has two sides: the centre, 0 here, tells on which one the cylinder is. Asked about both, a rim that was
                 # level with the surface had contacts that pressed it to either, and most cylinders fell through a landscape.
                 if not geometry.closed[round_] and dot(m, a) > 0.0:
-                    m, corners = along(ZERO, -1.0, m), (b, a, c)
-                count = rims_on_plane(solid, found, count, m, corners, TRIANGLE, 3 * triangle + 2)
+                    m, corners, beyond = along(ZERO, -1.0, m), (b, a, c), ZERO
+                else:
+                    beyond = _beyond_sides(geometry, solid, view, triangle, corners)
+                count = rims_on_plane(solid, found, count, (m, corners, beyond), TRIANGLE, 3 * triangle + 2)
     if skeleton > 0.0 or count == found.first:  # the closest point of a smooth body is a contact in any case
         pair, triangle = _closest_triangle(geometry, solid, view, round_, margin + skeleton, stack)
         distance, p, q, n = pair
@@ -160,6 +163,17 @@ def cylinder_round_contacts(geometry, cylinder, round_, pose, margin, contacts, 
             touch = (p, along(q, -skeleton, n), n, distance - skeleton)
             count = append(solid, found, count, touch, SIDE, 3 * triangle + 2)
     return count
+
+
+@inner
+def _beyond_sides(geometry, solid, view, triangle, corners):
+    """Return how far beyond each side of a face a rim may meet it, m: in valleys that the centre is in (see `mesh_mesh`)."""
+    beyond = ZERO
+    for k in range(3):
+        is_valley, normal = across_valley(geometry, triangle, k)
+        reach = solid.margin if is_valley and dot(to_axes(view.x, view.y, view.z, normal), corners[k]) <= 0.0 else 0.0
+        beyond = (beyond[1], beyond[2], reach)
+    return beyond
 
 
 @inner

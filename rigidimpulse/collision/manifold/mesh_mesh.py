@@ -4,7 +4,8 @@ The features of two skeletons at distance d <= margin + r_a + r_b that are local
 then taken off along the normal: gap = d - r_a - r_b.
 - vertex - face: the vertex projects into the face, and no edge that leaves it dives below by more than the margin
   (else the vertex of a box that stands flush on another one would meet its side). All corners within the margin
-  count: a flat contact gives its corners.
+  count: a flat contact gives its corners. Near the bottom of a valley a vertex over one face meets the other one, too:
+  it projects into its plane only when it is there, and what slides fast is through by the next look.
 - edge - edge (see `mesh_edges`): the common normal meets both edges and lies in the Gauss arcs of both. Nearly parallel
   edges have both ends of their overlap, with the normal at its middle.
 - vertex - edge, vertex - vertex: the normal n runs between the points; it must lie in the arc of the edge and in the
@@ -119,7 +120,8 @@ def _face_contact(geometry, view, found, count, vertex, triangle):
     height = dot(subtract(p, a), normal)
     if height > view.skeleton or height < -view.reach or (height < -view.depth and not view.two_sided):
         return count
-    if not is_over_face(geometry, p, triangle, height, 0.0):
+    valley = view.skeleton if height >= 0.0 or not view.two_sided else 0.0
+    if not is_over_face(geometry, p, triangle, height, 0.0, valley):
         return count
     side, foot = subtract(b, a), along(p, -height, normal)
     size, crease = sqrt(dot(side, side)), CREASE * abs(height)
@@ -290,7 +292,7 @@ def _search(geometry, meeting, motion, leeway, scratch, found, count):
     begin, last_row = rows_of_search(scratch.features)
     rows, pairs, reach, pose = scratch.features.rows[begin:last_row], scratch.pairs, exact[0].reach, meeting.pose
     angle = max(turn, 0.0)
-    limits = NodeLimits(reach, reach + way, exact[0].depth + INSIDE * reach + way, cos(angle), sin(angle))
+    limits = NodeLimits(reach, reach + way, exact[0].depth + exact[0].skeleton + INSIDE * reach + way, cos(angle), sin(angle))
     pairs[0, 0], pairs[0, 1] = geometry.node_first[meeting.first], geometry.node_first[meeting.second]
     used, together, any_near, any_left_out = np.int64(0), True, False, False
     stacked = np.int64(1)  # (a literal would compile the walk twice)

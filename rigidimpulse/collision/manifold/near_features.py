@@ -7,8 +7,8 @@ most theta. A pair of features is left out only if it has no contact (see `mesh_
 - Edges d, e cross with the normal c = d x e. With q the sine between them, |change of c| <= theta |d| |e|, so that the direction of c turns
   by at most phi = asin(theta / q), seen from either body, and misses an arc by 2 phi less at best (`arc_miss` adds two products with
   c). The distance of the two lines along c changes by at most s + phi (reach + s): beyond that it is known on which side each body is.
-- A vertex over a face: its way over the face and beyond its sides is at most s, and u.n changes by at most theta |u| for each edge u
-  that leaves the vertex.
+- A vertex over a face, or over the other face of a valley: its way over the face and beyond its sides is at most s, and u.n changes by at
+  most theta |u| for each edge u that leaves the vertex.
 - A vertex beside an edge or a vertex: the way w from it to the line or the point changes by at most s. A contact has w.u <= tau |w| for
   some unit vectors u, or sums of two of them. So it had  n.u <= tau (1 + psi) + 2 psi  with n = w / |w| and psi = s / |w|; an edge of the
   vertex turns: theta (1 + psi) more.
@@ -34,6 +34,8 @@ EDGES, ON_FACE, ON_FEATURE, FLIPPED = (np.int64(kind) for kind in (0, 1, 2, 2))
 body, or, with FLIPPED added, of the second."""
 CREASE = 2.0 * TOLERANCES.surface.flat_angle
 """How far outside a face beyond a hidden edge a point still counts as inside, relative to its height."""
+VALLEY = 0.99
+"""Cosine of the angle of two faces at a hidden edge up to which it is the bottom of a valley."""
 EVERY_NORMAL = -1.0
 """In place of theta: all pairs in reach, whatever their normals."""
 MOST_PHI = 0.5
@@ -63,25 +65,53 @@ def in_vertex_cone(geometry, corner, direction, slack, tolerance):
 
 
 @inner
-def is_over_face(geometry, p, triangle, height, further):
-    """Tell whether a point at a height over the plane of a face [m] is over the face, or beside it by at most `further` [m]."""
+def across_valley(geometry, triangle, side):
+    """Return whether a side of a face is the bottom of a valley, and the normal of the face on the other side."""
+    edge, normal = geometry.triangle_edge[triangle, side], row(geometry.triangle_normal, triangle)
+    if geometry.edge_kind[edge] != EDGE_HIDDEN:
+        return False, normal
+    normal_0, normal_1 = edge_normals(geometry.edge_normal, edge)
+    return dot(normal_0, normal_1) <= VALLEY, subtract(along(normal_0, 1.0, normal_1), normal)
+
+
+@inner
+def _slack_beyond(geometry, p, triangle, side, slack, reach):
+    """How far beyond a side of a face a point at `p` is still over it, m.
+
+    slack: (m beyond any side, m beyond hidden edges of what is flat); reach: see `is_over_face`.
+    """
+    further, crease = slack
+    edge = geometry.triangle_edge[triangle, side]
+    if geometry.edge_kind[edge] != EDGE_HIDDEN:
+        return further
+    is_valley, other_normal = across_valley(geometry, triangle, side)
+    a = row(geometry.vertex, geometry.edge[edge, 0])
+    d, x = subtract(row(geometry.vertex, geometry.edge[edge, 1]), a), subtract(p, a)
+    # Behind the other face is the back of an open surface, from which the valley is a ridge.
+    if reach <= 0.0 or not is_valley or dot(other_normal, x) < -further:
+        return further + crease
+    share = dot(x, d) / dot(d, d)
+    off = along(x, -min(max(share, 0.0), 1.0), d)
+    return further + crease + (reach if dot(off, off) <= reach * reach else 0.0)
+
+
+@inner
+def is_over_face(geometry, p, triangle, height, further, reach):
+    """Tell whether a point at a height over the plane of a face [m] is over the face, or beside it by at most `further` [m].
+
+    reach: m, how near the bottom of a valley points over the other face of it count, too.
+    """
     a, b, c = (
         row(geometry.vertex, geometry.triangle[triangle, 0]),
         row(geometry.vertex, geometry.triangle[triangle, 1]),
         row(geometry.vertex, geometry.triangle[triangle, 2]),
     )
-    hidden = (
-        geometry.edge_kind[geometry.triangle_edge[triangle, 0]] == EDGE_HIDDEN,
-        geometry.edge_kind[geometry.triangle_edge[triangle, 1]] == EDGE_HIDDEN,
-        geometry.edge_kind[geometry.triangle_edge[triangle, 2]] == EDGE_HIDDEN,
-    )
     side = subtract(b, a)
-    inside = INSIDE * sqrt(dot(side, side)) + further
     # Across a hidden edge the faces may meet at up to the flat angle: their prisms overlap, so that no gap is between.
-    crease = CREASE * (abs(height) + further)
-    slack_ab = inside + (crease if hidden[0] else 0.0)
-    slack_bc = inside + (crease if hidden[1] else 0.0)
-    slack_ca = inside + (crease if hidden[2] else 0.0)
+    slack = (INSIDE * sqrt(dot(side, side)) + further, CREASE * (abs(height) + further))
+    slack_ab = _slack_beyond(geometry, p, triangle, 0, slack, reach)
+    slack_bc = _slack_beyond(geometry, p, triangle, 1, slack, reach)
+    slack_ca = _slack_beyond(geometry, p, triangle, 2, slack, reach)
     return over_triangle(p, a, b, c, row(geometry.triangle_normal, triangle), slack_ab, slack_bc, slack_ca)
 
 
@@ -163,7 +193,8 @@ def _may_touch_face(geometry, view, corner, p, face, motion):
         return False
     if turn < 0.0:
         return True
-    if (height < -view.depth and not view.two_sided) or not is_over_face(geometry, p, face, height, way):
+    valley = view.skeleton if height >= -way or not view.two_sided else 0.0
+    if (height < -view.depth and not view.two_sided) or not is_over_face(geometry, p, face, height, way, valley):
         return False
     inward = turned(view.R_back, (-normal[0], -normal[1], -normal[2]))
     if in_vertex_cone(geometry, corner, inward, view.skeleton, TILT + turn):

@@ -3,7 +3,8 @@
 Soft contacts let bodies sink in, and the kernels of `dispatch` need bodies that are apart. So they are asked about smaller shapes with the
 same corners, edges and faces. What they find is put back: the same corner, edge or face of the true shape makes the contact.
 
-    polyhedra that are convex    d is taken off along each axis of the body:  x_k (1 - d / h_k),  h_k their half length along it
+    polyhedra that are convex    all faces are d farther in, or more:  x_k (1 - f_k),  f_k = d / h_k, h_k their half length along axis k
+                                 of the body, or more where faces are at an angle to the axes (`make_smaller_shapes`)
     cylinders                    d is taken off at both ends and all around
     other bodies that move       inset surfaces, see `inset_surface`; their rounded parts get thinner
 
@@ -24,18 +25,13 @@ it smaller, a ball that rolls off the end of a plank would leave it too early.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from rigidimpulse.collision.distance.simplices import CORNER, EDGE_EDGE, FACE_VERTEX, HALF_SPACE_CONTACT, VERTEX_FACE
-from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, CompiledShape, Geometry, Primitive, build_geometry, joined
-from rigidimpulse.collision.manifold.convexity import convex_polyhedra, inner_radii, several_polyhedra
+from rigidimpulse.collision.geometry import HALF_SPACE, Geometry
 from rigidimpulse.collision.manifold.cylinder_rims import FIRST_FEATURE, NUM_FEATURES, RIM
-from rigidimpulse.collision.manifold.dispatch import MOST_HULL_CORNERS
-from rigidimpulse.collision.manifold.inset_surface import moved_in
 from rigidimpulse.core.kernels import jit
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import along, cross, dot, length, row, scaled, subtract, turned_back_by, turned_by
@@ -49,12 +45,8 @@ LEVELS = 1 + len(PARTS)
 BESIDE_MESHES = 2
 """The first level beside meshes. A corner that slides into a valley may sink into the far side before its smaller one is over that and
 finds it. With the level of SHRINK a dozen of 160 bodies fell through landscapes and funnels at "preview", with this one two did."""
-DEPTH = 0.012
-"""d of inset surfaces, as a part of the radius that encloses a body."""
 ENOUGH = 2.0
 """Depths of a contact that the level which is asked about must allow: it may be as much deeper at the next look."""
-THIN = 0.25
-"""Part of the radius of a ball, capsule or cylinder in a compound that d may be."""
 CROSSWISE, ALIKE = 0.1, 0.9
 """Sine of the angle of two edges from which the place where they cross is asked for; least cosine of the normal found and the true one."""
 AT_CORNER, ON_RIM, ON_CYLINDER, ON_EDGE, IN_FACE = (np.int64(where) for where in range(5))
@@ -76,130 +68,6 @@ class SmallerShapes(NamedTuple):
     polyhedron: np.ndarray  # (n,) bool, by rank: convex polyhedra
     deeper: np.ndarray  # (n,) bool, by rank: these and cylinders, which have more levels than the first
     takes_up: np.ndarray  # (n,) bool, by rank: whether what meets the body may be asked about as it is
-
-
-def make_smaller_shapes(
-    shapes: Sequence[CompiledShape], geometry: Geometry, depths: np.ndarray, moves: np.ndarray, of_body: np.ndarray, order: np.ndarray
-) -> SmallerShapes:
-    """Make the smaller shapes of a scene.
-
-    Args:
-        shapes: all shapes of the scene; geometry: their arrays.
-        depths: (s,) m, `convexity.convex_depths`.
-        moves: (s,) bool, shapes of bodies that move freely.
-        of_body: (n,) shape of each body, by index; order: (n,) indices by rank.
-
-    """
-    number, convex, inner = len(shapes), convex_polyhedra(geometry, depths), inner_radii(geometry, depths)
-    depth, takes_up, deeper, made = np.zeros(number), np.zeros(number, bool), np.zeros(number, bool), []
-    slack, taken_off, shape = np.zeros((LEVELS, number)), np.zeros((LEVELS, number)), np.tile(np.arange(number), (LEVELS, 1))
-    for s, compiled in enumerate(shapes):
-        one, single = compiled.primitives[0], len(compiled.primitives) == 1
-        takes_up[s] = single and (one.kind == CYLINDER or one.radius >= max(SHRINK * inner[s], 1e-300))
-    drums = takes_up & (geometry.kind[geometry.shape_first[:-1]] == CYLINDER)
-    asked = _asked_beside_others(geometry, convex, takes_up)
-    for s, compiled in enumerate(shapes):
-        one, single = compiled.primitives[0], len(compiled.primitives) == 1
-        deeper[s] = drums[s] or (moves[s] and convex[s])
-        if drums[s] or (deeper[s] and asked):
-            slack[1:, s] = np.array(PARTS if drums[s] else (PARTS[1], *PARTS[1:])) * (_radius(one) if drums[s] else inner[s])
-            made += [(s, level, _level(one, slack[level, s])) for level in range(1, LEVELS) if slack[level, s] > slack[level - 1, s]]
-        elif not deeper[s] and moves[s] and (not single or len(one.faces)):
-            depth[s] = d = _inset_depth(geometry, s, compiled)
-            made.append((s, 1, CompiledShape(tuple(_inset(p, d) for p in compiled.primitives))))
-    everything = joined(geometry, build_geometry([smaller for _, _, smaller in made])) if made else geometry
-    back, growth = _lost(geometry, everything, made)
-    for k, (s, level, _) in enumerate(made):
-        shape[level:, s] = number + k
-        taken_off[level:, s] = depth[s] if depth[s] > 0.0 else _most_taken_off(everything, back, growth, number + k)
-    if not asked:
-        # One level, and no new trees and normals: these take long for many hulls.
-        alike, behind = np.flatnonzero(deeper & ~drums), len(everything.vertex)
-        shape[1:, alike], slack[1:, alike] = number + len(made) + alike, SHRINK * inner[alike]
-        everything = joined(everything, _shrunk(geometry))
-        back = np.pad(back, ((0, len(everything.vertex) - behind), (0, 0)))
-        growth = np.pad(growth, ((0, len(everything.kind) - len(growth)), (0, 0)))
-        back[behind:, :3] = SHRINK * geometry.vertex
-        for s in alike.tolist():
-            taken_off[1:, s] = _most_taken_off(everything, back, growth, int(shape[1, s]))
-    own = of_body[order]
-    taken_off, slack = np.ascontiguousarray(taken_off[:, own]), np.ascontiguousarray(slack[:, own])
-    return SmallerShapes(
-        everything, number, shape[:, of_body].ravel(), back, growth, taken_off, slack, depth[own], convex[own], deeper[own], takes_up[own]
-    )
-
-
-def _asked_beside_others(geometry: Geometry, convex: np.ndarray, takes_up: np.ndarray) -> bool:
-    """Whether polyhedra (s,) bool meet shapes beside which they are asked about as smaller ones: meshes, or polyhedra of many corners."""
-    half_space = geometry.kind[geometry.shape_first[:-1]] == HALF_SPACE
-    known = convex | takes_up | half_space | several_polyhedra(geometry)
-    return not known.all() or int(np.diff(geometry.vertex_first).max(initial=0)) > MOST_HULL_CORNERS
-
-
-def _shrunk(geometry: Geometry) -> Geometry:
-    """All shapes shrunk about the centres of mass of their bodies."""
-    f = 1.0 - SHRINK
-    frame = geometry.frame * [f, f, f, 1.0, 1.0, 1.0, f]
-    return geometry._replace(
-        vertex=f * geometry.vertex, frame=frame, radius=f * geometry.radius, node_min=f * geometry.node_min, node_max=f * geometry.node_max,
-        bound_centre=f * geometry.bound_centre, bound_radius=f * geometry.bound_radius,
-    )  # fmt: skip
-
-
-def _level(p: Primitive, d: float) -> CompiledShape:
-    """A convex polyhedron or a cylinder with a surface that is d m farther in along each axis of the body."""
-    if p.kind == CYLINDER:
-        # Not less of the radius: the prism for deep contacts, see `penetrating.SIDES`, must be farther out than this.
-        return CompiledShape((_shorter(p, d, max(d, SHRINK * p.radius)),))
-    reach = np.minimum(p.vertices.max(axis=0), -p.vertices.min(axis=0))
-    return CompiledShape((replace(p, vertices=p.vertices * (1.0 - d / reach)),))
-
-
-def _inset_depth(geometry: Geometry, s: int, compiled: CompiledShape) -> float:
-    """Depth d of the inset surface of shape s, m."""
-    first, last = int(geometry.shape_first[s]), int(geometry.shape_first[s + 1])
-    reach = np.linalg.norm(geometry.bound_centre[first:last], axis=1) + geometry.bound_radius[first:last]
-    # A ball, capsule or cylinder can give up only a part of its radius, which limits the depth of all.
-    return min([DEPTH * float(reach.max()), *(THIN * _radius(p) for p in compiled.primitives if not len(p.faces))])
-
-
-def _radius(p: Primitive) -> float:
-    """Radius of a ball or capsule, of a cylinder this or half its height if that is less, m."""
-    return min(p.radius, float(p.frame[6])) if p.kind == CYLINDER else p.radius
-
-
-def _inset(p: Primitive, d: float) -> Primitive:
-    """The inset surface of a primitive, at a depth of d m."""
-    if p.kind == CYLINDER:
-        return _shorter(p, d, d)
-    return replace(p, vertices=moved_in(p, d)) if len(p.faces) else replace(p, radius=p.radius - d)
-
-
-def _shorter(cylinder: Primitive, half: float, radius: float) -> Primitive:
-    """A cylinder whose half height and radius are less by so much, m."""
-    return replace(cylinder, radius=cylinder.radius - radius, frame=np.append(cylinder.frame[:6], cylinder.frame[6] - half))
-
-
-def _lost(true: Geometry, everything: Geometry, made: list[tuple[int, int, CompiledShape]]) -> tuple[np.ndarray, np.ndarray]:
-    """What the smaller shapes that were made of the true ones have lost: `back` and `growth` of `SmallerShapes`."""
-    back, growth, p = np.zeros((len(everything.vertex), 4)), np.zeros((len(everything.kind), 2)), len(true.kind)
-    for s, _, smaller in made:
-        for q in range(int(true.shape_first[s]), int(true.shape_first[s]) + len(smaller.primitives)):
-            mine = slice(int(everything.vertex_first[p]), int(everything.vertex_first[p + 1]))
-            back[mine, :3] = true.vertex[true.vertex_first[q] : true.vertex_first[q + 1]] - everything.vertex[mine]
-            back[mine, 3] = true.radius[q] - everything.radius[p]
-            if true.kind[q] == CYLINDER:
-                growth[p] = true.frame[q, 6] / everything.frame[p, 6] - 1.0, true.radius[q] / everything.radius[p] - 1.0
-            p += 1
-    return back, growth
-
-
-def _most_taken_off(everything: Geometry, back: np.ndarray, growth: np.ndarray, s: int) -> float:
-    """Largest |m| of a smaller shape of one primitive, m."""
-    p = int(everything.shape_first[s])
-    lost = growth[p] * [everything.frame[p, 6], everything.radius[p]]
-    moved = np.linalg.norm(back[everything.vertex_first[p] : everything.vertex_first[p + 1], :3], axis=1)
-    return float(max(np.linalg.norm(lost), moved.max(initial=0.0)))
 
 
 @jit

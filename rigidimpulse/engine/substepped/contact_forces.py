@@ -30,9 +30,10 @@ from rigidimpulse.collision.fat_boxes import BodyBounds, FatBoxes
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.convexity import convex_polyhedra, inner_radii, several_polyhedra
 from rigidimpulse.collision.manifold.dispatch import GENERAL, PairQuery, Posed, pair_gap
+from rigidimpulse.collision.manifold.make_smaller_shapes import make_smaller_shapes
 from rigidimpulse.collision.manifold.penetrating import solids
 from rigidimpulse.collision.manifold.polyhedra import make_polyhedra
-from rigidimpulse.collision.manifold.smaller_shapes import LEVELS, SmallerShapes, make_smaller_shapes
+from rigidimpulse.collision.manifold.smaller_shapes import LEVELS, SmallerShapes
 from rigidimpulse.core.memory import reserve
 from rigidimpulse.core.portable import dot, length
 from rigidimpulse.core.quaternion import rotate, to_matrix
