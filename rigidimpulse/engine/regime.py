@@ -8,9 +8,10 @@ The exact regime is more accurate, so it is used wherever it can be afforded. "a
                 Bodies at rest take 2 to 4 solves, a fall of boxes 10 to 20; each takes about as long as a step of a small
                 sub-stepped island
     or joints   an island with joints that something is near, each body of which the exact regime solved more than EXPENSIVE_SOLVES
-                times a step, in the mean of the last ones; EXPENSIVE_JOINTED times where it has less than FEW bodies: a door on a soft
-                hinge takes up to 9 though it touches nothing. Where nothing is near it EXPENSIVE_SWING times, by as much less often
-                as it has more bodies than SMALL. A body that hangs alone stays exact, and so does what rolling friction may act on
+                times a step, in the mean of the last ones; EXPENSIVE_JOINTED times where it has less than FEW bodies and was in no
+                contact in the last step: a door on a soft hinge takes up to 9 though it touches nothing. Where nothing is near it
+                EXPENSIVE_SWING times, by as much less often as it has more bodies than SMALL. A body that hangs alone stays exact,
+                and so does what rolling friction may act on
     or runaway  in the middle of a step, an island of which a body was solved more than RUNAWAY times in the step, or by as much less
                 often as it has more bodies than LARGE: it costs more than it advances. So do islands in which two bodies come to contact
                 again and again and no impulse keeps them apart. They are handed over at that instant, whatever they are made of.
@@ -33,6 +34,8 @@ A body without joints that moves farther than FAST of its inner radius in a sub-
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -183,42 +186,50 @@ def unlike(world: World, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return world.dynamic[a] & world.dynamic[b] & heavy
 
 
-def refusals(
-    world: World, root: np.ndarray, substepped_before: np.ndarray, joined: np.ndarray, moves: np.ndarray, solve_count: np.ndarray,
-    pairs: tuple[np.ndarray, np.ndarray], auto: bool,
-) -> dict[int, str]:  # fmt: skip
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What is known of n bodies where it is decided which islands are sub-stepped."""
+
+    root: np.ndarray  # (n,) -1 for those in no island
+    substepped_before: np.ndarray  # (n,) bool, members of sub-stepped islands
+    joined: np.ndarray  # (n,) bool, with joints
+    struck: np.ndarray  # (n,) bool, the exact regime found them in contact in the last step
+    moves: np.ndarray  # (n,) bool
+    solve_count: np.ndarray  # (n,) how often the exact solver dealt with each body in the last step
+
+
+def refusals(world: World, bodies: Judged, pairs: tuple[np.ndarray, np.ndarray], auto: bool) -> dict[int, str]:
     """Why islands are not sub-stepped, by their root; the condition `low` is not tested here.
 
     Args:
         world: the compiled scene.
-        root: (n,) of every body; -1 for those in no island.
-        substepped_before: (n,) bool, members of sub-stepped islands. joined, moves: (n,) bool.
-        solve_count: (n,) how often the exact solver dealt with each body in the last step.
+        bodies: all of them.
         pairs: bodies a and b, (k,) each, of the pairs that may touch in the step.
         auto: False where every island is taken that touches something or has joints.
 
     """
     out: dict[int, str] = {}
-    a, b = pairs
+    (a, b), root = pairs, bodies.root
     members = np.flatnonzero(root >= 0)
     size = np.bincount(root[members], minlength=len(root))
-    was_substepped, has_joints, touches = np.zeros((3, len(root)), bool)
-    was_substepped[root[members[substepped_before[members]]]] = True
-    has_joints[root[members[joined[members]]]] = True
+    was_substepped, has_joints, is_struck, touches = np.zeros((4, len(root)), bool)
+    for flag, of_body in ((was_substepped, bodies.substepped_before), (has_joints, bodies.joined), (is_struck, bodies.struck)):
+        flag[root[members[of_body[members]]]] = True
     # The island of each pair: that of whichever body is in one.
     owner = np.where(root[a] >= 0, root[a], root[b])
     touches[owner] = True
     if not auto:
         return dict.fromkeys(np.flatnonzero((size > 0) & ~touches & ~has_joints).tolist(), "alone")
-    moving_count = np.bincount(root[members[moves[members]]], minlength=len(root))
-    solves = solves_in_islands(root, solve_count)
+    moving_count = np.bincount(root[members[bodies.moves[members]]], minlength=len(root))
+    solves = solves_in_islands(root, bodies.solve_count)
     expensive = solves > EXPENSIVE_SOLVES
     lively_enough = expensive & (_number(world) >= SOME) if only_expensive(world) else expensive | (moving_count >= FEW)
     least = np.where(was_substepped, KEPT, np.where(lively_enough, FEW, MANY))
     for r in np.flatnonzero((size > 0) & (size < least) & ~has_joints).tolist():
         out[r] = "few bodies"
     swings = EXPENSIVE_SWING / np.maximum(size / SMALL, 1.0)
-    cheap = solves <= np.where(touches, np.where(size < FEW, EXPENSIVE_JOINTED, EXPENSIVE_SOLVES), swings)
+    near = np.where((size < FEW) & ~is_struck, EXPENSIVE_JOINTED, EXPENSIVE_SOLVES)
+    cheap = solves <= np.where(touches, near, swings)
     # Sub-steps have no rolling friction.
     stays_exact = np.full(len(root), True) if world.rolling.size else cheap | (size < KEPT)
     for r in np.flatnonzero(has_joints & ~was_substepped & stays_exact).tolist():

@@ -42,7 +42,7 @@ from rigidimpulse.engine.exact.step_size import Forces, StepLimits, Turning, est
 from rigidimpulse.engine.exact.trajectories import set_impact_margins, take_steady_load
 from rigidimpulse.engine.islands import touching_islands
 from rigidimpulse.engine.pair_events import PairEvents
-from rigidimpulse.engine.regime import TALL, island_roots, refusals, support_levels
+from rigidimpulse.engine.regime import TALL, Judged, island_roots, refusals, support_levels
 from rigidimpulse.engine.run import Run, start_trajectories
 from rigidimpulse.engine.sleeping import advance_sleep_timers, stands_still, wake_by_contact
 from rigidimpulse.engine.spheres.run import EventRun
@@ -224,7 +224,7 @@ def _stand_beside_sub_steps(run: Run) -> None:
     # Columns of one row only would be another type.
     a, b = np.array([[0, 1], [0, 1]]).T
     root = island_roots(world.num_bodies, a, b, member)
-    refusals(world, root, member, ~member, member, np.zeros(world.num_bodies), (a, b), True)
+    refusals(world, Judged(root, member, ~member, member, member, np.zeros(world.num_bodies)), (a, b), True)
     support_levels(stepper.bodies, stepper.table.pairs, stepper.table.points, TALL)
     steady, poses, now = world.steady_acceleration, (np.zeros((1, 3)), np.zeros((1, 4)), np.zeros((1, 6))), state.now
     end_trajectories(state.trajectory, members, 0.0, steady, now, state.rotation, run.acceleration, run.angular_acceleration)

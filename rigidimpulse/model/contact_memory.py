@@ -279,6 +279,11 @@ def held_pairs(memory: ContactMemory, start: np.ndarray) -> np.ndarray:
     return pairs[(held["count"] > 0) & (since >= start[pairs].max(axis=1, initial=-np.inf))]
 
 
+def rebounded_pairs(memory: ContactMemory, since: float, number: int) -> np.ndarray:
+    """Pairs (k, 2) that rebounded at the time `since` [s] or later; number: of all bodies."""
+    return np.column_stack(np.divmod(memory.key[(memory.key >= 0) & (memory.time >= since)], number))
+
+
 def carried_memory(memory: ContactMemory, index: np.ndarray, carried: np.ndarray, number: int) -> ContactMemory:
     """The memory of the same pairs among other bodies, `number` of them.
 

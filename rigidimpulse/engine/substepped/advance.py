@@ -34,6 +34,7 @@ from rigidimpulse.engine.regime import (
     FAST,
     SPIN,
     TALL,
+    Judged,
     crowded,
     is_crowd,
     island_roots,
@@ -54,6 +55,7 @@ from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.substepped.waypoints import Way, part_of, way_of, write_frames
 from rigidimpulse.engine.warm_up import prepare_kernels
+from rigidimpulse.model.contact_memory import held_pairs, rebounded_pairs
 from rigidimpulse.model.island import Island, island_without_contacts
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.evaluate import bring_all
@@ -217,7 +219,8 @@ class SubsteppedIslands:
             touches[np.where(root[a] >= 0, root[a], root[b])] = True
             refused = self.hand_over.cheapest.refusals(root, self.label >= 0, joined, touches, solve_count)
         else:
-            refused = refusals(world, root, self.label >= 0, joined, moves, solve_count, (a, b), self._auto)
+            judged = Judged(root, self.label >= 0, joined, _struck(run, joined, time), moves, solve_count)
+            refused = refusals(world, judged, (a, b), self._auto)
         inside = self.stepper.inside_others(run, member & (self.label >= 0) & np.isin(root, list(refused)))
         refused = {r: reason for r, reason in refused.items() if r not in root[inside]}
         refused.update(dict.fromkeys(np.unique(root[member & self.hand_over.open]).tolist(), "joints that sub-steps do not close"))
@@ -624,6 +627,15 @@ class SubsteppedIslands:
             out.members, (out.position, out.orientation, out.velocity), (run.world.steady_strength, stepper.inner, stepper.skin), length,
             self._stood, self.sleep_timer,
         )  # fmt: skip
+
+
+def _struck(run: Run, joined: np.ndarray, time: float) -> np.ndarray:
+    """Which bodies (n,) bool the exact regime has found in contact in the step before `time`, s; asked where any are joined, (n,) bool."""
+    out, memory = np.zeros(len(joined), bool), run.state.memory
+    if joined.any():
+        out[held_pairs(memory, run.state.trajectory.start)] = True
+        out[rebounded_pairs(memory, time - run.world.accuracy.step, len(joined))] = True
+    return out
 
 
 def _bare_island(time: float) -> Island:
