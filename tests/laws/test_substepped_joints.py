@@ -154,11 +154,11 @@ def test_limits_hold_and_joints_let_go() -> None:
     assert run.status.ok and [event.kind for event in run.status.events] == ["joint let go"]
 
 
-@pytest.mark.parametrize(("links", "down"), [(4, False), (8, True), (14, True)])
-def test_a_chain_that_lands_is_stepped_where_it_is_expensive(links: int, down: bool) -> None:
-    """At "standard" 8 links and more go to sub-steps; what is left of their energy is the same within 2 %, their places within 5 mm.
+@pytest.mark.parametrize("links", [4, 8, 14])
+def test_a_chain_that_lands_is_stepped_where_it_is_expensive(links: int) -> None:
+    """At "standard" all go to sub-steps; what is left of their energy is the same within 2 %, their places within 5 mm.
 
-    With a limit of 48 solves a step all three stay exact.
+    With a limit of 48 solves a step all three stay exact, with one of 16 for less than 8 bodies the first one does.
     """
     scene = ri.Scene(bodies=[ri.Body("floor", ri.Shape.half_space(), motion="static")])
     for k in range(links):
@@ -168,7 +168,7 @@ def test_a_chain_that_lands_is_stepped_where_it_is_expensive(links: int, down: b
         if k:
             scene.add(ri.BallJoint(f"link {k - 1}", f"link {k}", (0.1 * k - 0.05, 0.0, 0.09 + 0.02 * k)))
     run, exact = ri.simulate(scene, 1.0), ri.simulate(scene, 1.0, accuracy=ri.Accuracy(contact_solver="newton"))
-    assert run.status.ok and stepped(run) == down
+    assert run.status.ok and stepped(run)
     assert np.all(np.diff(energy(run)) <= 1e-9)
     np.testing.assert_allclose(energy(run)[-1], energy(exact)[-1], rtol=0.02)
     ends = [np.array([of.position(f"link {k}")[-1] for k in range(links)]) for of in (run, exact)]
