@@ -24,7 +24,6 @@ from rigidimpulse.engine.measure.record import RunRecord
 from rigidimpulse.recording.ledger import Masses, mechanics
 from rigidimpulse.recording.recorder import Frames
 
-MEASURED = {"energy made", "energy taken", "momentum not kept", "bodies inside each other"}
 BOX = ri.Shape.box((0.2, 0.2, 0.2))
 FLOOR = ri.Body("floor", ri.Shape.half_space(), motion="static")
 
