@@ -21,9 +21,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigidimpulse.collision.geometry import Geometry
 from rigidimpulse.collision.segment_crossings import crossings
 from rigidimpulse.core.quaternion import to_matrix
-from rigidimpulse.core.triangles import unique_edges
 from rigidimpulse.engine.measure.depth import distance_from_triangles, inner_points, middles_of
 from rigidimpulse.engine.measure.overlap import LATE, REMEDY
 from rigidimpulse.engine.measure.record import Fault, RunRecord
@@ -184,15 +184,12 @@ def _surfaces(world: World, shape: int) -> list[_Surface]:
         number = int(geometry.shape_first[shape]) + k
         if len(primitive.faces) and not geometry.closed[number]:
             triangles = primitive.vertices[primitive.faces]
-            found.append(_Surface(number, triangles, middles_of(triangles), _border(triangles)))
+            found.append(_Surface(number, triangles, middles_of(triangles), _border(geometry, number)))
     return found
 
 
-def _border(triangles: np.ndarray) -> np.ndarray:
-    """Sides (e, 2, 3) of an odd number of triangles (t, 3, 3)."""
-    # Files may give corners of each triangle of their own.
-    vertices, corner = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    faces = corner.reshape(-1, 3)
-    edges = unique_edges(faces, len(vertices))
-    sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    return vertices[sides[edges.first[edges.count % 2 == 1]]]
+def _border(geometry: Geometry, primitive: int) -> np.ndarray:
+    """Edges (e, 2, 3) of an odd number of triangles of a primitive. Those whose triangles only run the wrong way round are no border."""
+    triangles = slice(geometry.triangle_first[primitive], geometry.triangle_first[primitive + 1])
+    edges = geometry.triangle_edge[triangles].ravel()
+    return geometry.vertex[geometry.edge[np.flatnonzero(np.bincount(edges) % 2 == 1)]]
