@@ -33,8 +33,9 @@ class NoJoints:
     table: Joints
     moment: np.ndarray
 
-    def __init__(self) -> None:
-        """No force was ever recorded."""
+    def __init__(self, num_bodies: int) -> None:
+        """No joint is at any of the bodies, and no force was ever recorded."""
+        self._joined = np.zeros(num_bodies, bool)
         self.names: list[str] = []
         self.reactions: list[tuple[float, int, np.ndarray]] = []
 
@@ -49,6 +50,10 @@ class NoJoints:
     def links(self) -> np.ndarray:
         """No joint joins bodies."""
         return NO_LINKS
+
+    def joined(self) -> np.ndarray:
+        """No body has a joint."""
+        return self._joined
 
     def moving_bodies(self, _run: Any) -> np.ndarray:
         """No joint moves."""

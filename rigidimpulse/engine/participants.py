@@ -67,6 +67,10 @@ class RunJoints(Protocol):
         """Bodies (l, 2) that whole joints join."""
         ...
 
+    def joined(self) -> np.ndarray:
+        """Dynamic bodies (n,) bool at whole joints."""
+        ...
+
     def carry_on(self, run: Any, earlier: Any, /) -> None:
         """Begin at the time of the run, where the joints of an earlier run are."""
         ...

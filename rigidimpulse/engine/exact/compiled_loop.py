@@ -22,10 +22,13 @@ from rigidimpulse.engine.exact.event_loop import (
     AT_END,
     AT_EVENT,
     BODIES,
+    COMES_BACK,
     FIND,
+    GIVEN,
     HOLD,
     LOAD,
     MOVE,
+    NEXT,
     NO_CAPACITY,
     NOT_FINITE,
     NOT_RECORDED,
@@ -34,7 +37,6 @@ from rigidimpulse.engine.exact.event_loop import (
     REPORT,
     RESPOND,
     ROWS,
-    SHORT_OF_PAIRS,
     SQUEEZED,
     SWEEP,
     SWEEP_STALLED,
@@ -91,10 +93,13 @@ def why_not(world: World, plan: Plan) -> str:
         return f"the time of impact is found by {accuracy.impact_time!r}"
     if plan.includes(FCL):
         return "contacts are FCL's"
-    if world.joints_of_scene or world.force_tables:
-        return "there are joints, or forces vary"
     missing = [name for name in NEEDED if not plan.includes(name)]
     return f"without {missing[0]}" if missing else ""
+
+
+def _of_python(run: Run) -> np.ndarray:
+    """Bodies (n,) bool that are jointed, pushed by varying forces, or sub-stepped: what happens to them is up to the loop in Python."""
+    return (run.substepped.label >= 0) | run.joints.joined() | run.state.by_joints | run.forces.acts
 
 
 TABLE, MEMORY, LIMITER, LOG, CONTACT_LOG, REPORTS = (
@@ -126,8 +131,8 @@ class CompiledLoop:
         state = run.state
         pairs = np.empty((most_pairs(n), 2), np.int32)
         self._steps = Steps(np.zeros(2), world.static_min, world.static_max, pairs)
-        # Others look at the run between two steps, or take its steps, there.
-        self._goes_on = not run.plan.observe and not run.plan.includes("event kernel")
+        # Others look at the run between two steps, or take its steps, there, and soft bodies may come to press on anything.
+        self._goes_on = not (run.plan.observe or run.plan.includes("event kernel") or run.soft_bodies.moves)
         self._record = Record(
             Loop(
                 settings, world.compiled_shapes, pair_bodies(world), world.margins, world.coefficients, world.rolling, self._elsewhere,
@@ -155,27 +160,29 @@ class CompiledLoop:
     def advance(self, run: Run, pair_events: PairEvents, event: tuple[float, np.ndarray], until: float) -> tuple[float, np.ndarray]:
         """Go on from an event, its time [s] and bodies, to the end of the step, or to an event for the loop in Python.
 
-        Where nothing else looks at the run between two steps, the next ones are taken, too, as far as `until` [s]. Returns the time and the
-        bodies of the event.
+        Where nothing else looks at the run between two steps, the next ones are taken, too, as far as `until` [s]. Returns the time of the
+        event, and those of its bodies that are left to the loop in Python.
         """
-        if run.solve_rows is not None or (not pair_events.substepped_begun and pair_events.inside.any()):
+        mark, (time, bodies), how = np.zeros(run.world.num_bodies, bool), event, NO_CAPACITY
+        self._elsewhere[:] = _of_python(run)
+        if run.solve_rows is not None or self._elsewhere[bodies].all():
             return event
-        mark, (time, bodies), is_given, how = np.zeros(run.world.num_bodies, bool), event, True, NO_CAPACITY
+        # The loop in Python begins the sub-stepped islands of a step at its first event.
+        given = GIVEN if pair_events.substepped_begun or not pair_events.inside.any() else COMES_BACK
         mark[bodies] = True
-        self._elsewhere[:] = run.substepped.label >= 0
         self._steps.times[:] = pair_events.begin, pair_events.end
         last = until if self._goes_on and not self._elsewhere.any() else pair_events.end
         while how not in (AT_END, AT_EVENT):
             start, before = perf_counter(), self._cycles.copy()
-            how, time, is_given = run_events(self._updated(run, pair_events), mark, is_given, time, last, self._scratch)
+            how, time, given = run_events(self._updated(run, pair_events), mark, given, time, last, self._scratch)
             pair_events.follow(*self._steps.times.tolist())
             self._account(perf_counter() - start, before)
             self._tell(run, pair_events)
             if how == NO_CAPACITY:
                 self._grow(run)
-            elif how == SHORT_OF_PAIRS:
+            elif how != AT_END:
                 pair_events.add_missing_pairs(time)
-        if how == AT_EVENT and not is_given:
+        if how == AT_EVENT and given == NEXT:
             pair_events.count_contacts(time)
         return float(time), mark.nonzero()[0] if how == AT_EVENT else NONE
 

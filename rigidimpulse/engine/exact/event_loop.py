@@ -3,8 +3,11 @@
 From event to event it calls the kernels that the loop in Python calls, in the same order, so the results are the same bits. It takes one
 step after the other, see `step_begin`, and returns to Python at the end of a step where it may not begin the next one, and before an event
 
-    that reaches a body which the loop in Python must look after (`Fixed.elsewhere`), or with a body that runs away,
+    with a body that runs away,
     for which there is no space in the memory of contacts or in what is recorded.
+
+Bodies that are jointed, pushed or sub-stepped are Python's (`Loop.elsewhere`), and so is whatever hangs together with one of them at an
+instant. All else that happens at that instant is dealt with first, here. Then the loop ends with the bodies that are left to Python.
 
 `compiled_loop` calls it.
 """
@@ -23,6 +26,7 @@ from rigidimpulse.collision.time_of_impact.safe_step import SweepScratch
 from rigidimpulse.collision.time_of_impact.search import first_contacts
 from rigidimpulse.core.cycles import cycles
 from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.core.union_find import root_of, unite
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
 from rigidimpulse.dynamics.constraints.joint_impact import JointBlock
@@ -101,8 +105,10 @@ from rigidimpulse.recording.events import has_capacity as has_log_capacity
 from rigidimpulse.recording.recorder import Frames
 
 AT_END, AT_EVENT, NO_CAPACITY, SHORT_OF_PAIRS = np.arange(4)
-"""How the loop ends: at the end of a step; before an event that Python looks after; before one for which there is no space; after one
-that found no space for a pair."""
+"""How the loop ends: at the end of a step; before an event, or the part of one, that Python looks after; before one for which there is no
+space; after one that found no space for a pair."""
+NEXT, GIVEN, COMES_BACK = np.arange(3)
+"""Whether an event is given: no, it is the next one; yes; yes, and the loop ends behind it, whoever is left to Python."""
 FIND, SWEEP, RESPOND, LOAD, HOLD, MOVE, VERBS = np.arange(7)
 """Places in `Loop.cycles` and `Loop.calls`."""
 ENERGIES = 6
@@ -257,20 +263,22 @@ def make_found(capacity, number, scratch):
 
 
 @jit_making_arrays
-def run_events(loop, bodies, is_given, time, until, scratch):
+def run_events(loop, bodies, given, time, until, scratch):
     """Go from event to event, from `time` to the end of the step, and of further steps that end at `until` [s] or before.
 
-    bodies (n,) bool: of the event at `time` if `is_given`, else after that; and then those of the event before which it ends. scratch: see
-    `manifold.contact_points`. Returns how it ends, when, and whether that is the event that was given; `loop.steps` tells in which step.
+    bodies (n,) bool: of the event at `time` if it is `given`; and then those that are left to Python of the event at which it ends. scratch:
+    see `manifold.contact_points`. Returns how it ends, when, and whether contacts of that event are counted; `loop.steps` tells in which
+    step.
     """
     motion, table, shapes, constants = loop.motion, loop.table, loop.shapes, loop.bodies.constants
     number, limiter, used_cycles, calls = len(bodies), loop.limiter, loop.cycles, loop.calls
     shared = Shared(limiter.under_contact, limiter.sharing, np.empty((0, 2), np.int64))
     found, end, events = make_found(FIRST_CONTACTS, number, scratch), loop.steps.times[END], 0
+    aside = np.zeros(number, np.bool_)
     while True:
         if not _can_report(loop.reports, number, table.number[USED]):
-            return NO_CAPACITY, time, is_given
-        if not is_given:
+            return NO_CAPACITY, time, given
+        if given == NEXT:
             start = cycles()
             _sweep_stale(loop, end)
             used_cycles[SWEEP] += cycles() - start
@@ -282,42 +290,104 @@ def run_events(loop, bodies, is_given, time, until, scratch):
                 begins = events < MOST_EVENTS and loop.reports.used[ROWS] == 0 and begin_step(loop, until, bodies)
                 used_cycles[FIND] += cycles() - start
                 if not begins:
-                    return AT_END, end, is_given
+                    return AT_END, end, given
                 calls[FIND] += 1
-                time, end, is_given = loop.steps.times[BEGIN], loop.steps.times[END], True
+                time, end, given = loop.steps.times[BEGIN], loop.steps.times[END], GIVEN
                 continue
             mark_met(table, constants.dynamic, time, bodies)
+        if not _any_other(bodies, loop.elsewhere):
+            return AT_EVENT, time, given
         count = NONE
         while count < 0:
             for i in range(number):
-                found.reached[i] = bodies[i]
+                found.reached[i] = bodies[i] and not loop.elsewhere[i]
             count = find_touching(shapes, constants, motion, table, shared, found, time)
             if count < 0:
                 found = make_found(-2 * count, number, scratch)
-        if _is_elsewhere(loop.elsewhere, found.brought, bodies):
-            return AT_EVENT, time, is_given
         if not _has_capacity(loop, count):
-            return NO_CAPACITY, time, is_given
-        if not is_given:
+            return NO_CAPACITY, time, given
+        if given == NEXT:
             _count_contacts(loop, time)
+        count = _set_aside(loop, found, count, aside)
         for i in range(number):
-            if bodies[i]:
+            if bodies[i] and not (loop.elsewhere[i] or aside[i]):
                 table.wake[i] = np.inf
         if not _react(loop, found, count, time, end):
-            return AT_EVENT, time, True
-        is_given = False
+            return AT_EVENT, time, GIVEN
+        if _keep_aside(bodies, loop.elsewhere, aside) or given == COMES_BACK:
+            return AT_EVENT, time, GIVEN
+        _settle(loop, time)
+        given = NEXT
         events += 1
         if table.number[SHORT]:
-            return SHORT_OF_PAIRS, time, is_given
+            return SHORT_OF_PAIRS, time, given
 
 
 @jit
-def _is_elsewhere(elsewhere, brought, bodies):
-    """Whether an event touches bodies (n,) bool that the loop in Python looks after."""
-    for i in range(elsewhere.shape[0]):
-        if elsewhere[i] and (brought[i] or bodies[i]):
+def _any_other(bodies, elsewhere):
+    """Whether there are bodies (n,) bool, or none at all, that are not all Python's."""
+    none = True
+    for i in range(bodies.shape[0]):
+        if bodies[i] and not elsewhere[i]:
             return True
-    return False
+        none = none and not bodies[i]
+    return none
+
+
+@jit_making_arrays
+def _set_aside(loop, found, count, aside):
+    """Take out of what was found all that hangs together with a body that is Python's; returns how many contacts are left.
+
+    aside (n,) bool: these bodies, marked here.
+    """
+    elsewhere, limiter, dynamic = loop.elsewhere, loop.limiter, loop.bodies.constants.dynamic
+    reached, real, integer, number, touches = found.reached, found.buffers.real, found.buffers.integer, len(loop.elsewhere), False
+    for i in range(number):
+        aside[i] = False
+        touches = touches or (reached[i] and elsewhere[i])
+    if not touches:
+        return count
+    root, first = np.empty(number, np.int64), np.full(number, NONE)
+    for i in range(number):
+        root[i] = i
+    for c in range(count):
+        if dynamic[integer[c, 0]] and dynamic[integer[c, 1]]:
+            unite(root, integer[c, 0], integer[c, 1])
+    for i in range(number):
+        if reached[i] and limiter.under_contact[i]:
+            owner = limiter.sharing[i]
+            if first[owner] == NONE:
+                first[owner] = i
+            unite(root, first[owner], i)
+    is_python = np.zeros(number, np.bool_)
+    for i in range(number):
+        if reached[i] and elsewhere[i]:
+            is_python[root_of(root, i)] = True
+    for i in range(number):
+        if reached[i] and is_python[root_of(root, i)]:
+            aside[i], reached[i] = True, False
+    kept = np.int64(0)
+    for c in range(count):
+        if aside[integer[c, 0]] or aside[integer[c, 1]]:
+            continue
+        for k in range(real.shape[1]):
+            real[kept, k] = real[c, k]
+        for k in range(integer.shape[1]):
+            integer[kept, k] = integer[c, k]
+        found.place[kept] = found.place[c]
+        kept += 1
+    return kept
+
+
+@jit
+def _keep_aside(bodies, elsewhere, aside):
+    """Unmark the bodies (n,) bool of an event that were dealt with; returns whether some are left to Python."""
+    left = False
+    for i in range(bodies.shape[0]):
+        if bodies[i] and not (elsewhere[i] or aside[i]):
+            bodies[i] = False
+        left = left or bodies[i]
+    return left
 
 
 @jit
@@ -379,7 +449,7 @@ def _react(loop, found, count, time, end):
 
     Nothing does, and it returns False, where a body runs away: the loop in Python deals with that event.
     """
-    motion, table, dynamic, number = loop.motion, loop.table, loop.bodies.constants.dynamic, len(found.reached)
+    motion, dynamic, number = loop.motion, loop.bodies.constants.dynamic, len(found.reached)
     root, order = np.empty(number, np.int64), np.empty(count, np.int64)
     split_islands(dynamic, np.empty((0, 2), np.int64), found, count, root, order)
     touch = _touch(loop, found, order, time)
@@ -396,10 +466,15 @@ def _react(loop, found, count, time, end):
             loop, islands.record[k : k + 1], _part(touch, islands.contact_first[k], islands.contact_first[k + 1]),
             islands.member[first:last], islands.velocity[first:last],
         )  # fmt: skip
-    given_up = np.empty(table.number[USED], np.int64)
-    stuck = settle_pairs(table, time, dynamic, given_up)
-    _give_up(loop, NOT_RESOLVED, time, given_up[:stuck])
     return True
+
+
+@jit_making_arrays
+def _settle(loop, time):
+    """Let pairs that came to contact without consequence be swept again; those that do so too often are handed over or left alone."""
+    given_up = np.empty(loop.table.number[USED], np.int64)
+    count = settle_pairs(loop.table, time, loop.bodies.constants.dynamic, given_up)
+    _give_up(loop, NOT_RESOLVED, time, given_up[:count])
 
 
 @jit_making_arrays

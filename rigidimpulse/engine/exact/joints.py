@@ -153,6 +153,13 @@ class JointState:
         both = np.column_stack([self.table.body_a, self.table.body_b])
         return both[self.whole & np.all(both >= 0, axis=1)]
 
+    def joined(self) -> np.ndarray:
+        """Dynamic bodies (n,) bool at whole joints."""
+        mark = np.zeros(len(self._dynamic), bool)
+        for ends in (self.table.body_a[self.whole], self.table.body_b[self.whole]):
+            mark[ends[ends >= 0]] = True
+        return mark & self._dynamic
+
     def movable_end(self, joint: int) -> int:
         """A dynamic body of a joint."""
         a, b = int(self.table.body_a[joint]), int(self.table.body_b[joint])
