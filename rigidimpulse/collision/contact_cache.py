@@ -7,7 +7,7 @@ contacts were found, points of the pair have moved past each other by at most
 
 A pair that was s apart is still at least s - m apart. It needs no search while s - m is above the margin. The contacts of a touching pair
 are used again while m is below a part of the smaller inner radius. Their points are fixed in the bodies, so that separations stay exact.
-Their normals are fixed in the carrier.
+Their normals are fixed in the carrier. Where m is large, because the bodies were elsewhere for a while, the contacts are forgotten.
 
 The margin is the distance that the pair may come closer in the step (speculative contacts): contacts are known before they close. Bodies
 that fall one behind the other do not come closer until the first of them is stopped. So a pair may also come closer as fast as contacts
@@ -46,6 +46,9 @@ AHEAD, AHEAD_GENERAL, FARTHEST = 0.05, 0.12, 2.0
 """Least margin, least margin of general pairs, and greatest margin of the search for contacts, in inner radii."""
 SAME_GENERAL = 0.02
 """Least relative motion, in inner radii, after which the contacts of a touching general pair are found again; also of SEVERAL parts."""
+FORGOTTEN = 1.0
+"""Relative motion, in inner radii, after which contacts found before say nothing: their planes do not end, and bodies may be beyond what
+touched. A capsule that had rolled over a rim, and came back from free flight below it, was thrown by 0.6 rad (issue 27)."""
 TOO_FEW_POINTS, TOO_FEW_PLACES = -1, -2
 """What `find_contacts` ran out of: points of the table, or places of its workspace."""
 FAR = 4.0
@@ -314,6 +317,8 @@ def review(bodies, pairs, share, limits):
                 carrier, other = (b, a) if is_second else (a, b)
                 place, turn = _relative_pose(position, orientation, rotation, carrier, other)
                 motion = _motion(seen, p, pairs.round[p], reach[other], place, turn)
+                if motion > FORGOTTEN * size:
+                    count[p] = 0
                 # A pair that was s apart is still at least s - m apart.
                 if count[p] == 0 and apart[p] - motion > margin:
                     continue

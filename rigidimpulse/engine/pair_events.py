@@ -194,11 +194,11 @@ class PairEvents:
         moves = (self.run.state.trajectory.mode != FIXED) | self.run.soft_bodies.pressed
         return np.flatnonzero(moves & ~self.inside)
 
-    def may_meet(self, bodies: np.ndarray) -> bool:
-        """Whether some pair of these bodies is swept."""
+    def may_meet(self) -> np.ndarray:
+        """Bodies (n,) bool of pairs that are swept."""
         mark, pairs = np.zeros(len(self.wake), bool), self.pairs
-        mark[bodies] = True
-        return bool(np.any(mark[pairs["a"]] | mark[pairs["b"]]))
+        mark[pairs["a"]] = mark[pairs["b"]] = True
+        return mark
 
     def bodies_at(self, time: float) -> np.ndarray:
         """Movable bodies that come to contact, and bodies that are called, at `time`."""

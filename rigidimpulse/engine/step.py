@@ -8,8 +8,8 @@ After `arrive` both have the same four verbs: impacts, loads, contact forces, tr
 What takes part in a verb stands in a list of the plan: an effect that the scene does not call for is in none. `effects.py` says which
 functions it binds. Keyframes, soft bodies and the kernel of balls act before a step (`loop.py`).
 
-The same order stands once more in `exact/event_loop.py`, compiled, for events that need nothing but exact contact. `run.compiled` deals
-with those, and hands over the first event that this loop must look after. The results are the same bits.
+The same order stands once more in `exact/event_loop.py`, compiled, for islands that need nothing but exact contact. `run.compiled` deals
+with those, and leaves to this loop what is in the others at the first event that has such. The results are the same bits.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def step(run: Run, end: float, until: float) -> None:
     run.plan.perform(run.plan.pairs, run, pair_events)  # sub-stepped islands, which of them sleep; broad phase
     time, bodies = pair_events.begin, pair_events.active_bodies()  # load: resting, jointed, pushed, sub-stepped
     while time < pair_events.end:
-        time, bodies = run.compiled.advance(run, pair_events, (time, bodies), until)  # events that need nothing but exact contact
+        time, bodies = run.compiled.advance(run, pair_events, (time, bodies), until)  # what needs nothing but exact contact
         if time < pair_events.end:
             react(run, pair_events, time, bodies)
             time, bodies = next_event(run, pair_events)

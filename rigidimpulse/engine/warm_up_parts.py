@@ -302,8 +302,8 @@ def _step_jointed(run: Run) -> None:
     stepper = ContactStepper(run.world, run.world.dynamic, COARSE)
     joints = JointedStepper(run, stepper)
     run.state.now.inv_inertia[1] = np.eye(3)
-    stepper.set_up(run, np.array([1]), np.array([0]), STEP, fineness=joints.fineness(run, np.array([1]), 1))
-    joints.step(run, 0.0, STEP)
+    member, support = np.array([[1], [0]])
+    joints.step(run, member, (0.0, STEP), lambda fineness: stepper.set_up(run, member, support, STEP, fineness=fineness))
 
 
 def _step_any_shapes(run: Run) -> None:

@@ -266,9 +266,9 @@ def make_found(capacity, number, scratch):
 def run_events(loop, bodies, given, time, until, scratch):
     """Go from event to event, from `time` to the end of the step, and of further steps that end at `until` [s] or before.
 
-    bodies (n,) bool: of the event at `time` if it is `given`; and then those that are left to Python of the event at which it ends. scratch:
-    see `manifold.contact_points`. Returns how it ends, when, and whether contacts of that event are counted; `loop.steps` tells in which
-    step.
+    bodies (n,) bool: of the event at `time` if it is `given`; and then those of the last event that are left to Python. scratch: see
+    `manifold.contact_points`. Returns how it ends, when, and NEXT where the contacts of the last event are still to be counted;
+    `loop.steps` tells in which step.
     """
     motion, table, shapes, constants = loop.motion, loop.table, loop.shapes, loop.bodies.constants
     number, limiter, used_cycles, calls = len(bodies), loop.limiter, loop.cycles, loop.calls

@@ -48,9 +48,9 @@ from rigidimpulse.engine.regime import (
 )
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.sleeping import advance_sleep_timers, wake_by_contact
-from rigidimpulse.engine.substepped.contact_forces import COARSE, FINE, FINEST, ContactStepper, Fineness, Outcome, joined_outcomes
+from rigidimpulse.engine.substepped.contact_forces import COARSE, FINE, FINEST, ContactStepper, Fineness, Outcome
 from rigidimpulse.engine.substepped.hand_over import HandOver
-from rigidimpulse.engine.substepped.jointed import FINER, JointedStepper
+from rigidimpulse.engine.substepped.jointed import JointedStepper
 from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.substepped.waypoints import Way, part_of, way_of, write_frames
@@ -122,8 +122,8 @@ class SubsteppedIslands:
         self._joint_stepper: JointedStepper | None = None
         self._ends: dict[int, float] = {}
         self._began: dict[int, _Began] = {}
-        self._outcome: Outcome | None = None
-        self._outcome_begin = self._outcome_end = 0.0
+        self._outcomes: list[tuple[Outcome, float]] = []
+        self._outcome_begin = 0.0
         self._most = self._steps = 0
         self._refused: dict[str, int] = {}
 
@@ -437,11 +437,12 @@ class SubsteppedIslands:
         """Step an island from its time to the end of the step, with what touches it and is slow."""
         self._contact_forces(run, pair_events, island)
         # Where all bodies are stepped, nothing can happen before the next trajectories begin: the loop is not asked.
-        while self._outcome is not None and self._outcome_end < pair_events.end and self._has_all(run, pair_events, island):
+        while self._outcomes and self._outcomes[0][1] < pair_events.end and self._has_all(run, pair_events, island):
+            end = self._outcomes[0][1]
             self.begin_trajectories(run, pair_events)
-            members = self._due(pair_events, self._outcome_end)
+            members = self._due(pair_events, end)
             pair_events.wake[members] = np.inf
-            island = _bare_island(self._outcome_end)
+            island = _bare_island(end)
             self._bring_in(run, island, members)
             self._contact_forces(run, pair_events, island)
 
@@ -480,19 +481,19 @@ class SubsteppedIslands:
         members = members[~self.asleep[members]]
         joints = run.joints.at(members[self._jointed[members]])
         if len(joints):
-            joints = run.joints.break_at(run, joints, island.time)
-        end = self._end_of(run, pair_events, island.time, members, joints)
+            run.joints.break_at(run, joints, island.time)
         # In the middle of a step contacts may be kept for longer motion.
         kept = self.stepper.kept if island.time > pair_events.begin else 0.0
-        parts = self._solved_together(run, members)
-        self._steps += len(parts)
-        outcomes = [self._step(run, part, np.intersect1d(fresh, part), (island.time, end), kept) for part in parts]
-        stepped = [out for out in outcomes if out is not None]
-        self._outcome, self._outcome_begin, self._outcome_end = joined_outcomes(stepped) if stepped else None, island.time, end
-        for part, out in zip(parts, outcomes, strict=True):
+        self._outcomes, self._outcome_begin = [], island.time
+        for part in self._solved_together(run, pair_events, members):
+            self._steps += 1
+            end = self._end_of(run, pair_events, island.time, part)
+            out = self._step(run, part, np.intersect1d(fresh, part), (island.time, end), kept)
             if out is None:
                 self._give_back(run, pair_events, part, island.time)
-            elif end < pair_events.end:
+                continue
+            self._outcomes.append((out, end))
+            if end < pair_events.end:
                 # The island was not stepped to the end of the step: it is woken there.
                 pair_events.wake[part] = end
 
@@ -505,13 +506,21 @@ class SubsteppedIslands:
             begin_trajectory(run, pair_events, i, time, NOT_HELD, rests=False)
         pair_events.wake[members] = time
 
-    def _solved_together(self, run: Run, members: np.ndarray) -> list[np.ndarray]:
-        """Members that are solved together: islands with joints one by one, all others at once."""
+    def _solved_together(self, run: Run, pair_events: PairEvents, members: np.ndarray) -> list[np.ndarray]:
+        """Members that are solved together: islands with joints one by one, and all others at once.
+
+        Where it is worth it, those that nothing else may meet are apart from those that others may meet: they are stepped farther at once.
+        """
         joined = members[self._jointed[members]]
         labels = np.unique(self.label[np.intersect1d(joined, run.joints.bodies_of(run.joints.at(joined)))])
         parts = [members[self.label[members] == label] for label in labels.tolist()]
         rest = members[~np.isin(self.label[members], labels)]
-        return [rest, *parts] if len(rest) else parts
+        if self.stepper.alone_length > self.stepper.step_length:
+            met = np.isin(self.label[rest], self.label[rest[pair_events.may_meet()[rest]]])
+            parts = [rest[met], rest[~met], *parts]
+        else:
+            parts = [rest, *parts]
+        return [part for part in parts if len(part)]
 
     def _step(self, run: Run, members: np.ndarray, fresh: np.ndarray, span: tuple[float, float], kept: float) -> Outcome | None:
         """Step members that are solved together; fresh: those of them that were in no sub-stepped island. None if joints stay open."""
@@ -544,15 +553,13 @@ class SubsteppedIslands:
         return out
 
     def _step_jointed(self, run: Run, members: np.ndarray, span: tuple[float, float], kept: float) -> Outcome | None:
-        """Step an island with joints, more finely where it was not held; None if no sub-steps hold it."""
+        """Step an island with joints; None if no sub-steps hold it."""
         if self._joint_stepper is None:
             prepare_kernels(self._world, with_events=False, with_substepped=True)
             self._joint_stepper = JointedStepper(run, self.stepper)
-        for finer in FINER:
-            self._set_up(run, members, span[0], span[1] - span[0], kept, self._joint_stepper.fineness(run, members, finer))
-            if (out := self._joint_stepper.step(run, *span)) is not None:
-                return out
-        return None
+        return self._joint_stepper.step(
+            run, members, span, lambda fineness: self._set_up(run, members, span[0], span[1] - span[0], kept, fineness)
+        )
 
     def _take_in(self, run: Run, fresh: np.ndarray, time: float) -> None:
         """What exact contact did to bodies ends where they come to a sub-stepped island."""
@@ -566,16 +573,17 @@ class SubsteppedIslands:
             account_contact_work(run, i, time)
             run.state.under_contact[i] = False
 
-    def _end_of(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray, joints: np.ndarray) -> float:
-        """When trajectories of members end: before the step does where bodies are tiny or spin fast, or joints let go.
+    def _end_of(self, run: Run, pair_events: PairEvents, time: float, members: np.ndarray) -> float:
+        """When trajectories of members that are solved together end: before the step if they are tiny or spin fast, or joints let go.
 
         So they do where others may meet members in the step: what meets a body that turns, in the middle of its straight way, meets it
         elsewhere than it is.
         """
         stepper, step, straight = self.stepper, self.stepper.step_length, self.stepper.straight
-        if (len(joints) or stepper.alone_length > step) and not pair_events.may_meet(members):
+        joints = run.joints.at(members[self._jointed[members]])
+        if (len(joints) or stepper.alone_length > step) and not pair_events.may_meet()[members].any():
             step, straight = stepper.alone_length, np.inf
-        if len(joints) and len(self._solved_together(run, members)) == len(np.unique(self.label[members])):
+        if len(joints):
             step = run.world.accuracy.step
         stray = most_stray(run.state.now, members, stepper.pressed | self._finer, stepper.reach, stepper.skin, straight)
         spans = max(math.ceil(step / stepper.span(members, step) - 1e-9), 1)
@@ -610,15 +618,15 @@ class SubsteppedIslands:
 
     def begin_trajectories(self, run: Run, pair_events: PairEvents) -> None:
         """Give the members the trajectories that the solver found."""
-        out, state, time = self._outcome, run.state, self._outcome_begin
-        if out is None:
+        state, time = run.state, self._outcome_begin
+        if not self._outcomes:
             return
-        length = self._outcome_end - time
-        run.recorder.flush_all(state.trajectory, out.members, time)
-        depart(state.trajectory, out.members, time, length, state.now, out.position, out.orientation, out.velocity)
-        state.correction[out.members] = 0.0
-        self._update_sleep_timers(run, out, length)
-        pair_events.trajectories_changed(out.members, time)
+        for out, end in self._outcomes:
+            run.recorder.flush_all(state.trajectory, out.members, time)
+            depart(state.trajectory, out.members, time, end - time, state.now, out.position, out.orientation, out.velocity)
+            state.correction[out.members] = 0.0
+            self._update_sleep_timers(run, out, end - time)
+        pair_events.trajectories_changed(np.concatenate([out.members for out, _ in self._outcomes]), time)
 
     def _update_sleep_timers(self, run: Run, out: Outcome, length: float) -> None:
         """For how long each member has hardly moved from where it was."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -160,14 +160,6 @@ class Outcome:
     raised: np.ndarray
     given: np.ndarray
     waypoints: Waypoints | None
-
-
-def joined_outcomes(outcomes: list[Outcome]) -> Outcome:
-    """The outcomes of several sets of bodies as one, without waypoints; there is at least one."""
-    if len(outcomes) == 1:
-        return outcomes[0]
-    columns = [column.name for column in fields(Outcome) if column.name != "waypoints"]
-    return Outcome(*(np.concatenate([getattr(out, name) for out in outcomes]) for name in columns), waypoints=None)
 
 
 @dataclass(frozen=True)
@@ -372,6 +364,11 @@ class ContactStepper:
         self._progress[:] = 0
         self._progress[[STAGE, LENGTH, LEFT, LOOKED_AT]] = FIND, sub_steps // parts, sub_steps // parts, looked_at
         self._go_on(run, PLAN)
+
+    @property
+    def sub_step_length(self) -> float:
+        """Length of the sub-steps of the step that is set up, s."""
+        return float(self._step.h)
 
     @property
     def parts(self) -> int:
