@@ -34,10 +34,8 @@ class NoJoints:
     moment: np.ndarray
 
     def __init__(self, num_bodies: int) -> None:
-        """No joint is at any of the bodies, and no force was ever recorded."""
+        """No joint is at any of the bodies."""
         self._joined = np.zeros(num_bodies, bool)
-        self.names: list[str] = []
-        self.reactions: list[tuple[float, int, np.ndarray]] = []
 
     def at(self, _bodies: Sequence[int] | np.ndarray) -> np.ndarray:
         """No joint is at any body."""
@@ -61,6 +59,16 @@ class NoJoints:
 
     def report_start(self, _run: Any) -> None:
         """No joint is open."""
+
+    def add_to(self, _accounts: Any) -> None:
+        """No joint gave anything."""
+
+    def reactions(self, _times: np.ndarray) -> dict[str, np.ndarray]:
+        """No joint has a force."""
+        return {}
+
+    def keep(self, _count: int) -> None:
+        """There is nothing to leave."""
 
     def carry_on(self, _run: Any, _earlier: Any) -> None:
         """No joint goes on."""

@@ -84,7 +84,7 @@ def make_run(world: World, plan: Plan, recorder: Recorder, log: EventLog) -> Run
 
         run.narrow_phase = FclContacts(run)
     if world.joints_of_scene:
-        run.joints = JointState(world)
+        run.joints = JointState(world, recorder.times)
     if not why_not_substepped(world):
         run.substepped = SubsteppedIslands(world)
     return run

@@ -5,7 +5,7 @@ A run and its pair events are `Any` here: their types are made of these.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from rigidimpulse.model.island import Island
     from rigidimpulse.model.joint_table import Joints
     from rigidimpulse.model.world import World
+    from rigidimpulse.recording.impulses import ImpulseAccounts
     from rigidimpulse.recording.ledger import Ledger
     from rigidimpulse.recording.recorder import Recorder
 
@@ -32,10 +33,19 @@ if TYPE_CHECKING:
 class RunJoints(Protocol):
     """The joints of a run: `JointState`, or `NoJoints`. What follows `moving_bodies` is asked for islands that have joints."""
 
-    names: list[str]
-    reactions: list[tuple[float, int, np.ndarray]]
+    def add_to(self, accounts: ImpulseAccounts, /) -> None:
+        """Give what joints did so far to the accounts of impulses."""
+        ...
 
-    def at(self, bodies: Sequence[int] | np.ndarray, /) -> np.ndarray:
+    def reactions(self, times: np.ndarray, /) -> dict[str, np.ndarray]:
+        """Forces on b by joint name, (f, 3) N at the frame times."""
+        ...
+
+    def keep(self, count: int, /) -> None:
+        """Leave the first `count` frames only."""
+        ...
+
+    def at(self, bodies: np.ndarray, /) -> np.ndarray:
         """Whole joints at any of the given dynamic bodies, in order."""
         ...
 
@@ -117,7 +127,7 @@ class RunJoints(Protocol):
         """Note the mean forces (j, 3) N on b over a span of sub-steps."""
         ...
 
-    def account_sub_steps(self, run: Any, which: np.ndarray, began: float, time: float, /) -> None:
+    def account_sub_steps(self, which: np.ndarray, began: float, time: float, /) -> None:
         """Record the impulses of sub-steps that lasted from `began` to `time`, s."""
         ...
 

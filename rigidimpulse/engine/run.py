@@ -111,7 +111,7 @@ class Run:
 
     def keep(self, count: int) -> None:
         """Leave the first `count` frames only: the run ends before its time."""
-        for part in (self.recorder, self.impulses, self.contact_log, self.forces.log, self.soft_bodies):
+        for part in (self.recorder, self.impulses, self.contact_log, self.joints, self.forces.log, self.soft_bodies):
             part.keep(count)
 
     def quarantine(self, i: int, time: float) -> None:

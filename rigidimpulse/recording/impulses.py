@@ -24,15 +24,21 @@ if TYPE_CHECKING:
 
 
 @jit
+def add_force(times, start, end, force, gain):
+    """Add what a constant force (3,) N gives from start to end [s] to the gains since the frame before (f + 1, 3) N s."""
+    begin, last = start, place_in(times, end)
+    for f in range(place_in(times, begin), last + 1):
+        until = times[f] if f < last else end
+        for k in range(3):
+            gain[f, k] += (until - begin) * force[k]
+        begin = until
+
+
+@jit
 def add_forces(times, start, end, force, gain):
-    """Add what constant forces (m, 3) N give from start to end (m,) s to the gains since the frame before (f + 1, 3) N s, one by one."""
+    """The same of forces (m, 3) N, one by one; start, end (m,) s."""
     for r in range(force.shape[0]):
-        begin, last = start[r], place_in(times, end[r])
-        for f in range(place_in(times, begin), last + 1):
-            until = times[f] if f < last else end[r]
-            for k in range(3):
-                gain[f, k] += (until - begin) * force[r, k]
-            begin = until
+        add_force(times, start[r], end[r], force[r], gain)
 
 
 class ImpulseAccounts:
@@ -43,9 +49,9 @@ class ImpulseAccounts:
         self._times = times
         self._gains: dict[tuple[str, int, int], np.ndarray] = {}
 
-    def add(self, cause: str, a: int, b: int, start: float, end: float, force: np.ndarray) -> None:
-        """A constant force (3,) N of a cause on b, the opposite on a, from start to end [s]."""
-        add_forces(self._times, np.array([start]), np.array([end]), force[None], self._gain(cause, a, b))
+    def put(self, cause: str, a: int, b: int, gain: np.ndarray) -> None:
+        """What a cause gave to b since the frame before (f + 1, 3) N s, the opposite to a; the last row is after all frames."""
+        self._gains[cause, a, b] = gain
 
     def add_many(self, cause: str, a: np.ndarray, b: np.ndarray, start: np.ndarray, end: np.ndarray, force: np.ndarray) -> None:
         """Constant forces (m, 3) N of a cause on b (m,), the opposite on a (m,), from start to end (m,) s; those of a pair one by one."""

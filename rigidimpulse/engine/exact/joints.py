@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 import numpy as np
 
@@ -21,7 +20,6 @@ from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work
 from rigidimpulse.engine.islands import is_alone
 from rigidimpulse.engine.loads import load_over
-from rigidimpulse.engine.participants import RunJoints
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.contacts import Contacts, select
 from rigidimpulse.model.island import Island, island_without_contacts
@@ -29,6 +27,8 @@ from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.evaluate import bring_all, refresh_pose
 from rigidimpulse.motion.trajectory import FIXED
+from rigidimpulse.recording.impulses import ImpulseAccounts
+from rigidimpulse.recording.joint_log import JointLog
 from rigidimpulse.scene.fastening import fastening
 from rigidimpulse.scene.joint import Joint
 from rigidimpulse.scene.joint_coordinates import DISTANCE, RADIUS
@@ -72,12 +72,12 @@ class JointState:
         drift: (j,) energy gained or lost in the last sub-step without contacts, as a part of the kinetic energy.
         flights: of islands that nothing touches. lands: (j,) s, end of the present flight, nan if it is none.
         began: (j,) s, start of the present sub-step. length: (j,) s, that of the one before.
-        reactions: (time, joint, force (3,) on b) at the ends of sub-steps.
+        log: impulses on b, and forces on it at the ends of sub-steps.
 
     """
 
-    def __init__(self, world: World) -> None:
-        """All joints whole and without load."""
+    def __init__(self, world: World, times: np.ndarray) -> None:
+        """All joints whole and without load; times: (f,) s of the frames."""
         joints: list[Joint] = world.joints_of_scene
         self.table = world.joints
         self.memory = make_memory(world.joints, world.inertia)
@@ -99,7 +99,7 @@ class JointState:
         self._energy = np.full(len(joints), np.nan)
         self.began = np.zeros(len(joints))
         self.length = np.zeros(len(joints))
-        self.reactions: list[tuple[float, int, np.ndarray]] = []
+        self.log = JointLog(times, len(joints))
         self._allowed = TOLERANCES.joint.closed * world.joint_size
         self._joint_of_row = np.repeat(np.arange(len(joints)), np.diff(self.table.first))
         held = (self.table.coordinate < RADIUS) & np.isinf(self.table.stiffness) & np.isinf(self.table.lower) & np.isinf(self.table.upper)
@@ -123,6 +123,19 @@ class JointState:
                 if i >= 0 and world.dynamic[i]:
                     self._of_body.setdefault(i, []).append(j)
 
+    def add_to(self, accounts: ImpulseAccounts) -> None:
+        """Give what joints did so far to the accounts of impulses."""
+        bodies = np.column_stack([self.table.body_a, self.table.body_b])
+        self.log.add_to(accounts, [f"joint {name}" for name in self.names], bodies)
+
+    def reactions(self, times: np.ndarray) -> dict[str, np.ndarray]:
+        """Forces on b by joint name, (f, 3) N at the frame times."""
+        return self.log.reactions(self.names, times)
+
+    def keep(self, count: int) -> None:
+        """Leave the first `count` frames only."""
+        self.log.keep(count)
+
     def carry_on(self, run: Run, earlier: Run) -> None:
         """Begin at the time of the run: turns of joints that an earlier run has, too, are counted on, and those that broke stay broken.
 
@@ -143,10 +156,12 @@ class JointState:
             for row in range(self.table.first[j], self.table.first[j + 1]):
                 self.memory.angle[row] = angle.get(int(self.table.coordinate[row]), 0.0)
 
-    def at(self, bodies: Iterable[int]) -> np.ndarray:
+    def at(self, bodies: np.ndarray) -> np.ndarray:
         """Whole joints at any of the given dynamic bodies, in order."""
-        found = {j for i in bodies for j in self._of_body.get(int(i), ()) if self.whole[j]}
-        return np.array(sorted(found), np.int64)
+        asked = np.zeros(len(self._dynamic) + 1, bool)
+        asked[bodies] = self._dynamic[bodies]
+        # The world, -1, is asked for last.
+        return np.flatnonzero(self.whole & (asked[self.table.body_a] | asked[self.table.body_b]))
 
     def links(self) -> np.ndarray:
         """Bodies (l, 2) that whole joints join."""
@@ -210,7 +225,7 @@ class JointState:
             refresh_pose(members, now, state.rotation, state.trajectory.inertia)
             island.moved = True
         stop_joints(jointed, elapsed, self.moment)
-        self._record_impulses(run, which, island.time)
+        self._record_impulses(which, island.time)
         state.correction[members] += np.hstack([now.velocity[members], now.angular_velocity[members]]) - arrived
         if self._limited:
             # An impact at this instant: what came before goes on unchanged.
@@ -231,7 +246,7 @@ class JointState:
     def _land(self, run: Run, island: Island, elapsed: np.ndarray) -> None:
         """End the island's flight, as it was planned: its joints are closed and stopped already."""
         which, members = island.joints, island.members
-        self._record_impulses(run, which, island.time)
+        self._record_impulses(which, island.time)
         if self._limited:
             stop_at_limits(self._jointed(run, island), self.shock)
         self.length[which] = elapsed[which]
@@ -245,16 +260,14 @@ class JointState:
         if len(which) and np.all(begun == begun[0]) and kinetic > 0.0:
             self.drift[which] = abs(energy - begun[0]) / kinetic
 
-    def _record_impulses(self, run: Run, which: np.ndarray, time: float) -> None:
+    def _record_impulses(self, which: np.ndarray, time: float) -> None:
         """Impulses on b of the sub-steps that end: what is left of their forces, and what stopped the joints."""
-        for j in which.tolist():
-            a, b, cause = int(self.table.body_a[j]), int(self.table.body_b[j]), f"joint {self.names[j]}"
-            began = float(self.began[j])
-            if time > began:
-                elapsed = time - began
-                mean = self.pull[j] + 0.5 * elapsed * self.pull_rate[j]
-                run.impulses.add(cause, a, b, began, time, self.share[j] * mean + self.moment[j] / elapsed)
-            run.impulses.add_at(cause, a, b, time, self.shock[j] - self._accounted_shock[j])
+        lasted = which[time > self.began[which]]
+        elapsed = (time - self.began[lasted])[:, None]
+        mean = self.pull[lasted] + 0.5 * elapsed * self.pull_rate[lasted]
+        force = self.share[lasted, None] * mean + self.moment[lasted] / elapsed
+        self.log.add(lasted, self.began[lasted], np.full(len(lasted), time), force)
+        self.log.add_at(which, time, self.shock[which] - self._accounted_shock[which])
         self._accounted_shock[which] = self.shock[which]
 
     def impact_block(self, run: Run, island: Island) -> JointBlock:
@@ -338,7 +351,7 @@ class JointState:
         squares = np.bincount(i, square, minlength=world.num_bodies)
         swings = np.zeros(world.num_bodies, bool)
         for k in {self.movable_end(j) for j in which[self._pins[which]].tolist()}:
-            swings[k] = len(self.at([k])) == 1
+            swings[k] = len(self.at(np.array([k]))) == 1
         return math.sqrt(squares[~swings].max(initial=0.0)), math.sqrt(squares[swings].max(initial=0.0))
 
     def hold(
@@ -423,7 +436,7 @@ class JointState:
             rest = max(ends, SHORT * run.world.accuracy.step)
         run.wrench[members], run.wrench_rate[members] = flight.value[members], flight.rate[members]
         self.memory.wrench[members] = 0.0
-        self.reactions += [(island.time, j, self.pull[j].copy()) for j in which.tolist()]
+        self.log.note(island.time, which, self.pull[which])
         self._begin(run, island)
         self.lands[which] = island.time + h
         self._open_by, self.are_closed = 0.0, True
@@ -446,9 +459,7 @@ class JointState:
         past = self.flights.fly_past(self._jointed(run, island), run.acceleration, rest)
         for i, begun in zip(members.tolist(), before, strict=True):
             run.log.add_stretch(time, time + past, i, begun, mechanical_energy(now, constants, np.array([i])) - begun, True)
-        for j in which.tolist():
-            bodies = int(self.table.body_a[j]), int(self.table.body_b[j])
-            run.impulses.add(f"joint {self.names[j]}", *bodies, time, time + past, self.flights.flight.mean[j])
+        self.log.add(which, np.full(len(which), time), np.full(len(which), time + past), self.flights.flight.mean[which])
         island.time = time + past
         return past
 
@@ -533,7 +544,7 @@ class JointState:
         self.whole[j] = False
         pair = tuple(run.world.names[i] for i in self.bodies_of(np.array([j])))
         run.log.note(time, kind, pair, f"{self.names[j]}{why}")
-        self.reactions.append((time, j, np.zeros(3)))
+        self.log.note(time, np.array([j]), np.zeros((1, 3)))
         return j
 
     def begin_sub_steps(self, run: Run, bodies: np.ndarray, time: float) -> None:
@@ -551,14 +562,11 @@ class JointState:
         """Note the mean forces (j, 3) N on b over a span [s] of sub-steps of the other regime."""
         time, end = span
         self.pull[which], self.moment[which], self.began[which], self.length[which] = force[which], 0.0, end, 0.0
-        for j in which.tolist():
-            self.reactions.append((time, j, force[j].copy()))
+        self.log.note(time, which, force[which])
 
-    def account_sub_steps(self, run: Run, which: np.ndarray, began: float, time: float) -> None:
+    def account_sub_steps(self, which: np.ndarray, began: float, time: float) -> None:
         """Record the impulses of sub-steps that lasted from `began` to `time`, s."""
-        for j in which.tolist():
-            a, b = int(self.table.body_a[j]), int(self.table.body_b[j])
-            run.impulses.add(f"joint {self.names[j]}", a, b, began, time, self.pull[j])
+        self.log.add(which, np.full(len(which), began), np.full(len(which), time), self.pull[which])
 
     def break_at(self, run: Run, which: np.ndarray, time: float) -> np.ndarray:
         """Take out joints that are overloaded or due; returns those that stay."""
@@ -573,13 +581,12 @@ class JointState:
 
     def log_rest(self, island: Island) -> None:
         """Forces on b from here on, while the island sleeps."""
-        for j in island.joints.tolist():
-            self.reactions.append((island.time, j, self.pull[j].copy()))
+        self.log.note(island.time, island.joints, self.pull[island.joints])
 
     def _log(self, island: Island, h: float) -> None:
         """Forces on b at this instant: its impulses over half of the sub-steps on both sides."""
-        for j in island.joints.tolist():
-            self.reactions.append((island.time, j, self.moment[j] / (0.5 * (self.length[j] + h))))
+        which = island.joints
+        self.log.note(island.time, which, self.moment[which] / (0.5 * (self.length[which, None] + h)))
 
 
 def _slide_rate(now: BodyState, a: int, b: int, step: float) -> float:
@@ -592,18 +599,3 @@ def _slide_rate(now: BodyState, a: int, b: int, step: float) -> float:
     turn, distance = float(length(spin)), float(length(between))
     slide = float(length(now.velocity[b] - now.velocity[a] - np.cross(spin, between))) + turn * turn * distance * step
     return math.sqrt(turn * min(turn, slide / distance)) if distance > 0.0 else turn
-
-
-def reaction_table(joints: RunJoints, times: np.ndarray) -> dict[str, np.ndarray]:
-    """Forces on b by joint name, (f, 3) N at the frame times."""
-    table, nodes = {}, [[] for _ in joints.names]
-    for time, j, force in joints.reactions:
-        nodes[j].append((time, force))
-    for j, name in enumerate(joints.names):
-        if not nodes[j]:
-            table[name] = np.zeros((len(times), 3))
-            continue
-        at, force = (np.array(column) for column in zip(*nodes[j], strict=True))
-        last = np.append(np.flatnonzero(np.diff(at) > 0.0), len(at) - 1)
-        table[name] = np.column_stack([np.interp(times, at[last], force[last, k]) for k in range(3)])
-    return table

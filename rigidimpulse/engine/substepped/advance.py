@@ -371,7 +371,7 @@ class SubsteppedIslands:
             run.log.account_over(began.time, time, "joints", began.given * share)
             run.log.account_over(began.time, time, "sub-stepping", change - (began.raised - began.taken + began.given) * share)
             if len(began.joints) and time > began.time:
-                run.joints.account_sub_steps(run, began.joints, began.time, time)
+                run.joints.account_sub_steps(began.joints, began.time, time)
 
     def finish(self, run: Run) -> None:
         """Account for the energy of sub-steps that last until the end of the run, and tell the plan what was done."""

@@ -24,7 +24,7 @@ HOMES = (
     "engine.substepped", "engine.spheres", "engine.absent", "engine.cheapest", "engine.islands", "engine.finder", "engine.touching",
     "engine.narrow_phase", "engine.fcl_contacts", "engine.keyframe_paths", "engine.pair_events", "engine.pair_table", "engine.regime",
     "engine.run", "engine.soft_bodies", "engine.triggers", "engine.varying_forces", "recording.contact_log", "recording.contacts",
-    "recording.events", "recording.impulses", "recording.recorder",
+    "recording.events", "recording.impulses", "recording.joint_log", "recording.recorder",
 )  # fmt: skip
 """Packages and modules whose classes a state is made of: nothing in them reads or runs files."""
 FUNCTIONS = {
