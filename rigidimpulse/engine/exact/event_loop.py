@@ -417,13 +417,13 @@ def _count_contacts(loop, time):
 
 @jit
 def _give_up(loop, kind, time, places):
-    """Mark the bodies of pairs as those that run away, or report the pairs where nothing is handed over."""
+    """Mark the bodies of pairs as those that run away, and call them, or report the pairs where nothing is handed over."""
     dynamic, solve_count, table = loop.bodies.constants.dynamic, loop.counts.solves, loop.table
     for k in range(places.shape[0]):
         pair, handed = table.pairs[places[k]], False
         for i in (pair.a, pair.b):
             if dynamic[i] and solve_count[i] > NEVER:
-                solve_count[i], handed = np.inf, True
+                solve_count[i], table.wake[i], handed = np.inf, min(table.wake[i], time), True
         if not handed:
             _report_pairs(loop.reports, kind, time, table, places[k : k + 1])
 

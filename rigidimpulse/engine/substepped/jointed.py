@@ -85,10 +85,10 @@ class JointedStepper:
         of it taken back. Light links between heavy bodies may whip. And it is stepped once more where a hit in it has set bodies turning.
         set_up: puts the members before the solver, to be stepped so finely.
         """
-        stray, finer = 0.0, iter(FINER)
+        before, stray, finer = self._stray(run.state.now, members), 0.0, iter(FINER)
         part = next(finer, None)
         while part is not None:
-            set_up(self._fineness(run, members, part, stray))
+            set_up(self._fineness(max(before, stray), part))
             tried = self._try(run, *span)
             if tried is not None:
                 if stray == 0.0 and (stray := self._spun_up(run, tried.outcome)) > 0.0:
@@ -98,20 +98,16 @@ class JointedStepper:
             part = next(finer, None)
         return None
 
-    def _stray(self, run: Run, members: np.ndarray, turning: BodyState) -> float:
-        """How often in a second sub-steps must begin anew for members that turn so, 1/s."""
+    def _stray(self, turning: BodyState, members: np.ndarray) -> float:
+        """How often in a second sub-steps must begin for members that turn so, 1/s."""
         stepper, pairs = self._stepper, self._stepper.table.pairs
         near = np.zeros(len(stepper.pressed), bool)
         near[stepper.order[pairs.first]] = near[stepper.order[pairs.second]] = True
         return float(most_stray(turning, members, near, stepper.reach, stepper.skin, BEND * self._world.accuracy.substep_motion**2))
 
-    def _fineness(self, run: Run, members: np.ndarray, finer: int, stray: float) -> Fineness:
-        """How finely members are stepped from the present instant.
-
-        finer: in how many parts each sub-step is made; stray: how often they must begin for what turns in the step, 1/s.
-        """
+    def _fineness(self, stray: float, finer: int) -> Fineness:
+        """How finely members are stepped; stray: how often sub-steps must begin, 1/s, finer: in how many parts each of them is made."""
         accuracy = self._world.accuracy
-        stray = max(stray, self._stray(run, members, run.state.now))
         pieces = min(max(stray * accuracy.step, SUB_STEPS), MOST_SUB_STEPS)
         return Fineness(accuracy.step / (pieces * finer), MOTION * accuracy.substep_motion)
 
@@ -119,7 +115,7 @@ class JointedStepper:
         """How often in a second sub-steps must begin for how members turn at the end, 1/s; 0 if they began about as often."""
         turning = run.state.now._replace(angular_velocity=run.state.now.angular_velocity.copy())
         turning.angular_velocity[out.members] = out.velocity[:, 3:]
-        stray, step = self._stray(run, out.members, turning), self._world.accuracy.step
+        stray, step = self._stray(turning, out.members), self._world.accuracy.step
         wanted = min(stray * step, MOST_SUB_STEPS)
         return stray if wanted * self._stepper.sub_step_length > SPUN_UP * step else 0.0
 
