@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.collision.contact_buffer import Question
+from rigidimpulse.collision.contact_records import MEMBER, SUPPORT
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.dispatch import PairQuery
 from rigidimpulse.dynamics.energy import mechanical_energy
@@ -53,7 +54,7 @@ from rigidimpulse.engine.substepped.hand_over import HandOver
 from rigidimpulse.engine.substepped.jointed import JointedStepper
 from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
-from rigidimpulse.engine.substepped.waypoints import Way, part_of, way_of, write_frames
+from rigidimpulse.engine.substepped.waypoints import Flown, Way, part_of, way_of, write_frames
 from rigidimpulse.engine.warm_up import prepare_kernels
 from rigidimpulse.model.contact_memory import held_pairs, rebounded_pairs
 from rigidimpulse.model.island import Island, island_without_contacts
@@ -351,7 +352,7 @@ class SubsteppedIslands:
         labels = np.unique(self.label[members]).tolist()
         for label in labels:
             if label in self._began and (way := self._began[label].way) is not None:
-                write_frames(run.recorder, way, time)
+                write_frames(run.recorder, way, time, Flown(world.inertia[way.bodies], world.steady_acceleration[way.bodies]))
         run.recorder.flush_all(state.trajectory, members, time)
         end_trajectories(
             state.trajectory, members, time, world.steady_acceleration, state.now, state.rotation, run.acceleration,
@@ -542,7 +543,7 @@ class SubsteppedIslands:
             return None
         amounts = np.zeros((3, run.world.num_bodies))
         amounts[:, out.members] = out.taken, out.raised, out.given
-        way = way_of(out, run.state.now, time, end)
+        way = way_of(out, run.state.now, time, end, len(which) > 0 and self._flies(run, which))
         for label in np.unique(self.label[members]).tolist():
             mine = members[self.label[members] == label]
             self._ends[label] = end
@@ -551,6 +552,13 @@ class SubsteppedIslands:
             part = None if way is None else part_of(way, mine)
             self._began[label] = _Began(time, end, mine, energy, taken, raised, given, which, part)
         return out
+
+    def _flies(self, run: Run, which: np.ndarray) -> bool:
+        """Whether neither the joints `which` nor contacts hold the island that was stepped to anything that is no member."""
+        part, pairs = self.stepper.bodies.part, self.stepper.table.pairs
+        held = (pairs.count > 0) & ((part[pairs.first] == SUPPORT) | (part[pairs.second] == SUPPORT))
+        members = (part[pairs.first] == MEMBER) | (part[pairs.second] == MEMBER)
+        return not len(run.joints.supports_of(which)) and not np.any(held & members)
 
     def _step_jointed(self, run: Run, members: np.ndarray, span: tuple[float, float], kept: float) -> Outcome | None:
         """Step an island with joints; None if no sub-steps hold it."""
