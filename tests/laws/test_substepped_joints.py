@@ -115,7 +115,7 @@ def test_slow_motion_of_what_tumbles_shows_its_momenta(fps: float) -> None:
             scene.add(ri.BallJoint(f"link {k - 1}", f"link {k}", (0.13 * k - 0.065, 0.0, 5.0)))
     run = ri.simulate(scene, 0.5, fps=fps, accuracy="preview")
     assert run.status.ok and stepped(run), run.status.message
-    assert momentum_drifts(record_of_recording(run)).angular.max() < 1e-11
+    assert momentum_drifts(record_of_recording(run)).angular.max() < 1e-9
 
 
 def test_the_pin_of_a_hanging_rod_carries_its_weight() -> None:
