@@ -99,7 +99,9 @@ def why_not(world: World, plan: Plan) -> str:
 
 def _of_python(run: Run) -> np.ndarray:
     """Bodies (n,) bool that are jointed, pushed by varying forces, or sub-stepped: what happens to them is up to the loop in Python."""
-    return (run.substepped.label >= 0) | run.joints.joined() | run.state.by_joints | run.forces.acts
+    # What a joint held until it broke: that loop accounts for the end of such a trajectory.
+    was_joined = run.state.by_joints
+    return (run.substepped.label >= 0) | run.joints.joined() | was_joined | run.forces.acts
 
 
 TABLE, MEMORY, LIMITER, LOG, CONTACT_LOG, REPORTS = (

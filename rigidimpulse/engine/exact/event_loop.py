@@ -7,7 +7,8 @@ step after the other, see `step_begin`, and returns to Python at the end of a st
     for which there is no space in the memory of contacts or in what is recorded.
 
 Bodies that are jointed, pushed or sub-stepped are Python's (`Loop.elsewhere`), and so is whatever hangs together with one of them at an
-instant. All else that happens at that instant is dealt with first, here. Then the loop ends with the bodies that are left to Python.
+instant. All else that happens at that instant is dealt with first, here. Then the loop ends with the bodies that are left to Python. So a
+position correction near one of these sees its joints before they are closed, which is round-off.
 
 `compiled_loop` calls it.
 """
