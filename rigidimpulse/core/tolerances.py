@@ -344,12 +344,10 @@ class SubStepping:
     """Gap at which a joint counts as closed in sub-steps, relative to the smallest body that one joins; in rad for angles."""
     joints_open: float = 1e-4
     """The same from which open joints are reported: nobody sees less."""
-    joint_residual: float = 1e-7
+    joint_residual: float = 1e-6
     """Residual asked of the solver of joints and contacts, relative to the fastest rate before impulses act."""
-    joint_no_slip: float = 1e-6
+    joint_no_slip: float = 1e-5
     """Slip that counts as none there, relative to the same."""
-    closing_residual: float = 1e-3
-    """Residual asked of the solver that closes joints, relative to what counts as closed: it is repeated anyway."""
     last_sub_step: float = 1e-9
     """Part of a sub-step that rounding may leave over."""
     even_path: float = 1e-6

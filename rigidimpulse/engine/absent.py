@@ -10,6 +10,7 @@ import numpy as np
 from rigidimpulse.engine.exact.step_begin import make_counts
 from rigidimpulse.engine.pair_table import NEVER
 from rigidimpulse.model.island import Island
+from rigidimpulse.recording.joint_log import JointLog
 
 if TYPE_CHECKING:
     from rigidimpulse.dynamics.constraints.jointed_island import JointMemory
@@ -33,9 +34,9 @@ class NoJoints:
     table: Joints
     moment: np.ndarray
 
-    def __init__(self, num_bodies: int) -> None:
-        """No joint is at any of the bodies."""
-        self._joined = np.zeros(num_bodies, bool)
+    def __init__(self, num_bodies: int, times: np.ndarray) -> None:
+        """No joint is at any of the bodies; times: (f,) s of the frames."""
+        self._joined, self.log = np.zeros(num_bodies, bool), JointLog(times, [], NO_LINKS)
 
     def at(self, _bodies: Sequence[int] | np.ndarray) -> np.ndarray:
         """No joint is at any body."""
@@ -59,16 +60,6 @@ class NoJoints:
 
     def report_start(self, _run: Any) -> None:
         """No joint is open."""
-
-    def add_to(self, _accounts: Any) -> None:
-        """No joint gave anything."""
-
-    def reactions(self, _times: np.ndarray) -> dict[str, np.ndarray]:
-        """No joint has a force."""
-        return {}
-
-    def keep(self, _count: int) -> None:
-        """There is nothing to leave."""
 
     def carry_on(self, _run: Any, _earlier: Any) -> None:
         """No joint goes on."""

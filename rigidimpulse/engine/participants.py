@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rigidimpulse.model.island import Island
     from rigidimpulse.model.joint_table import Joints
     from rigidimpulse.model.world import World
-    from rigidimpulse.recording.impulses import ImpulseAccounts
+    from rigidimpulse.recording.joint_log import JointLog
     from rigidimpulse.recording.ledger import Ledger
     from rigidimpulse.recording.recorder import Recorder
 
@@ -33,16 +33,9 @@ if TYPE_CHECKING:
 class RunJoints(Protocol):
     """The joints of a run: `JointState`, or `NoJoints`. What follows `moving_bodies` is asked for islands that have joints."""
 
-    def add_to(self, accounts: ImpulseAccounts, /) -> None:
-        """Give what joints did so far to the accounts of impulses."""
-        ...
-
-    def reactions(self, times: np.ndarray, /) -> dict[str, np.ndarray]:
-        """Forces on b by joint name, (f, 3) N at the frame times."""
-        ...
-
-    def keep(self, count: int, /) -> None:
-        """Leave the first `count` frames only."""
+    @property
+    def log(self) -> JointLog:
+        """What joints give."""
         ...
 
     def at(self, bodies: np.ndarray, /) -> np.ndarray:

@@ -93,7 +93,7 @@ def make_recording(run: Run, duration: float) -> SimulatedRecording:
     ledger = make_ledger(recorder.frames._replace(times=times), Masses(mass, world.inertia, world.steady_acceleration), run.log, work)
     run.soft_bodies.add_to(ledger)
     contacts = run.contact_log.table()
-    run.joints.add_to(run.impulses)
+    run.joints.log.add_to(run.impulses)
     by_cause = impulses_by_cause(run, times, impacts, work)
     report_measured(record_of(world, recorder.frames._replace(times=times), ledger, by_cause), run.log)
     return SimulatedRecording(
@@ -109,7 +109,7 @@ def make_recording(run: Run, duration: float) -> SimulatedRecording:
         status=Status.of(run.log.events),
         plan=run.plan,
         scene=world.scene,
-        reactions=run.joints.reactions(times),
+        reactions=run.joints.log.reactions(times),
         contacts=contacts,
         by_cause=by_cause,
         soft_bodies=run.soft_bodies.tracks(),

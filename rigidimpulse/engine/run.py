@@ -94,7 +94,7 @@ class Run:
         self.box_max = np.empty((n, 3))
         self.solve_rows = row_solver(world.accuracy.contact_solver)
         self.error_estimate: ErrorEstimate = make_error_estimate(world, self.state.rotation)
-        self.joints: RunJoints = NoJoints(n)
+        self.joints: RunJoints = NoJoints(n, recorder.times)
         self.forces: RunForces = NoForces(n)
         self.soft_bodies: RunSoftBodies = NoSoftBodies(n)
         self.substepped: Substepping = NoSubstepping(n)
@@ -111,7 +111,7 @@ class Run:
 
     def keep(self, count: int) -> None:
         """Leave the first `count` frames only: the run ends before its time."""
-        for part in (self.recorder, self.impulses, self.contact_log, self.joints, self.forces.log, self.soft_bodies):
+        for part in (self.recorder, self.impulses, self.contact_log, self.joints.log, self.forces.log, self.soft_bodies):
             part.keep(count)
 
     def quarantine(self, i: int, time: float) -> None:

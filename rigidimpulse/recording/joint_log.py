@@ -20,10 +20,10 @@ def _add_forces(times, which, start, end, force, gains):
 class JointLog:
     """What each of j joints gives to its second body."""
 
-    def __init__(self, times: np.ndarray, number: int) -> None:
-        """times: (f,) s of the frames; number: of joints."""
-        self._times = times
-        self._gains, self._acted = np.zeros((number, len(times) + 1, 3)), np.zeros(number, bool)
+    def __init__(self, times: np.ndarray, names: Sequence[str], bodies: np.ndarray) -> None:
+        """times: (f,) s of the frames; names (j,) and both bodies (j, 2) of the joints."""
+        self._times, self._names, self._bodies = times, names, bodies
+        self._gains, self._acted = np.zeros((len(names), len(times) + 1, 3)), np.zeros(len(names), bool)
         self._at: list[float] = []
         self._joints: list[np.ndarray] = []
         self._forces: list[np.ndarray] = []
@@ -48,20 +48,20 @@ class JointLog:
         """Leave the first `count` frames only."""
         self._times, self._gains = self._times[:count], self._gains[:, : count + 1]
 
-    def add_to(self, accounts: ImpulseAccounts, causes: Sequence[str], bodies: np.ndarray) -> None:
-        """Give the impulses of joints that acted to the accounts; bodies (j, 2): both of each joint."""
+    def add_to(self, accounts: ImpulseAccounts) -> None:
+        """Give the impulses of joints that acted to the accounts."""
         for j in np.flatnonzero(self._acted).tolist():
-            accounts.put(causes[j], int(bodies[j, 0]), int(bodies[j, 1]), self._gains[j])
+            accounts.put(f"joint {self._names[j]}", int(self._bodies[j, 0]), int(self._bodies[j, 1]), self._gains[j])
 
-    def reactions(self, names: Sequence[str], times: np.ndarray) -> dict[str, np.ndarray]:
-        """Forces by joint name, (f, 3) N at the frame times."""
+    def reactions(self, times: np.ndarray) -> dict[str, np.ndarray]:
+        """Forces on their second bodies by joint name, (f, 3) N at the frame times."""
         table: dict[str, np.ndarray] = {}
         counts = [len(which) for which in self._joints]
         joints = np.concatenate([*self._joints, np.zeros(0, np.int64)])
         order = np.argsort(joints, kind="stable")
         at, force = np.repeat(np.array(self._at), counts)[order], np.concatenate([*self._forces, np.zeros((0, 3))])[order]
-        first = np.searchsorted(joints[order], np.arange(len(names) + 1))
-        for j, name in enumerate(names):
+        first = np.searchsorted(joints[order], np.arange(len(self._names) + 1))
+        for j, name in enumerate(self._names):
             mine = slice(int(first[j]), int(first[j + 1]))
             own = at[mine]
             if not len(own):

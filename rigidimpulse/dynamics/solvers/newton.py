@@ -321,7 +321,7 @@ def rounding_floor(rows, weight, p):
 
 @jit_making_arrays
 def prepare(rows, n):
-    """What a solver of these rows of n movable bodies needs, `Factored`: the same for other biases, bounds and impulses."""
+    """Nothing factored yet, of rows of n movable bodies."""
     elimination, count = plan_elimination(rows.first, rows.second, n), rows.bias.shape[0]
     known, right = np.empty((count, 3)), np.empty(12)
     for i in range(count):
@@ -335,13 +335,7 @@ def solve_newton(rows, n, target):
 
     target: residual asked for, m/s. Returns the residual of the natural map that was reached.
     """
-    return solve_prepared(rows, prepare(rows, n), target)
-
-
-@jit_making_arrays
-def solve_prepared(rows, factored, target):
-    """The same with what `prepare` made of rows between the same bodies, along the same directions."""
-    n, count = factored.pivots.shape[0], rows.bias.shape[0]
+    factored, count = prepare(rows, n), rows.bias.shape[0]
     # Few arrays: for a body or two, to make one for each took as long as a step of the search.
     of_bodies, of_rows = np.empty((5, n, 6)), np.empty((8, count))
     y, search = of_bodies[4], _search(of_bodies, of_rows, count)

@@ -204,6 +204,8 @@ def solve_factored(elimination, blocks, pivots, x):
         body = order[k]
         for t in range(start[k], start[k + 1]):
             upper, source = slot[body, later[t]], later[t]
+            if not _has_value(x, source):
+                continue
             for i in range(SIZE):
                 for m in range(SIZE):
                     x[body, i] -= blocks[upper, i, m] * x[source, m]

@@ -27,7 +27,6 @@ from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.evaluate import bring_all, refresh_pose
 from rigidimpulse.motion.trajectory import FIXED
-from rigidimpulse.recording.impulses import ImpulseAccounts
 from rigidimpulse.recording.joint_log import JointLog
 from rigidimpulse.scene.fastening import fastening
 from rigidimpulse.scene.joint import Joint
@@ -99,7 +98,7 @@ class JointState:
         self._energy = np.full(len(joints), np.nan)
         self.began = np.zeros(len(joints))
         self.length = np.zeros(len(joints))
-        self.log = JointLog(times, len(joints))
+        self.log = JointLog(times, self.names, np.column_stack([self.table.body_a, self.table.body_b]))
         self._allowed = TOLERANCES.joint.closed * world.joint_size
         self._joint_of_row = np.repeat(np.arange(len(joints)), np.diff(self.table.first))
         held = (self.table.coordinate < RADIUS) & np.isinf(self.table.stiffness) & np.isinf(self.table.lower) & np.isinf(self.table.upper)
@@ -122,19 +121,6 @@ class JointState:
             for i in pair:
                 if i >= 0 and world.dynamic[i]:
                     self._of_body.setdefault(i, []).append(j)
-
-    def add_to(self, accounts: ImpulseAccounts) -> None:
-        """Give what joints did so far to the accounts of impulses."""
-        bodies = np.column_stack([self.table.body_a, self.table.body_b])
-        self.log.add_to(accounts, [f"joint {name}" for name in self.names], bodies)
-
-    def reactions(self, times: np.ndarray) -> dict[str, np.ndarray]:
-        """Forces on b by joint name, (f, 3) N at the frame times."""
-        return self.log.reactions(self.names, times)
-
-    def keep(self, count: int) -> None:
-        """Leave the first `count` frames only."""
-        self.log.keep(count)
 
     def carry_on(self, run: Run, earlier: Run) -> None:
         """Begin at the time of the run: turns of joints that an earlier run has, too, are counted on, and those that broke stay broken.

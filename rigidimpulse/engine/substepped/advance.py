@@ -134,6 +134,11 @@ class SubsteppedIslands:
         prepare_kernels(self._world, with_events=False, with_substepped=True)
         return ContactStepper(self._world, self._movable, self._parts, self._sharing)
 
+    @cached_property
+    def _sub_step_of_all(self) -> float:
+        """Length of the sub-steps that all movable bodies together would have, s."""
+        return self.stepper.sub_step(np.flatnonzero(self._world.dynamic))
+
     @property
     def counts(self) -> SolveCounts:
         """How often the exact regime deals with the bodies."""
@@ -238,7 +243,7 @@ class SubsteppedIslands:
 
     def _leave_out_fast(self, run: Run, member: np.ndarray) -> None:
         """Unmark those that are too fast for sub-steps; what joints join stays together, and is given more of them."""
-        h, joined = self.stepper.sub_step(np.flatnonzero(run.world.dynamic)), member & self._jointed
+        h, joined = self._sub_step_of_all, member & self._jointed
         mark_slow(run.state.now, self.stepper.inner, FAST / h, SPIN / h, member)
         member |= joined
 
@@ -512,10 +517,11 @@ class SubsteppedIslands:
 
         Where it is worth it, those that nothing else may meet are apart from those that others may meet: they are stepped farther at once.
         """
-        joined = members[self._jointed[members]]
-        labels = np.unique(self.label[np.intersect1d(joined, run.joints.bodies_of(run.joints.at(joined)))])
-        parts = [members[self.label[members] == label] for label in labels.tolist()]
-        rest = members[~np.isin(self.label[members], labels)]
+        parts, rest = [], members
+        if len(joined := members[self._jointed[members]]):
+            labels = np.unique(self.label[np.intersect1d(joined, run.joints.bodies_of(run.joints.at(joined)))])
+            parts = [members[self.label[members] == label] for label in labels.tolist()]
+            rest = members[~np.isin(self.label[members], labels)]
         if self.stepper.alone_length > self.stepper.step_length:
             met = np.isin(self.label[rest], self.label[rest[pair_events.may_meet()[rest]]])
             parts = [rest[met], rest[~met], *parts]

@@ -22,17 +22,15 @@ import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
-from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.joint import joint_values
-from rigidimpulse.dynamics.constraints.joint_limits import limit_side
+from rigidimpulse.dynamics.constraints.jointed_island import count_joint_rows
 from rigidimpulse.dynamics.constraints.rows import change_velocities, take_rows
-from rigidimpulse.dynamics.solvers.newton import prepare, solve_prepared
+from rigidimpulse.dynamics.solvers.free_rows import count_free, factor_free, give, take_free
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import set_orientation, turn_freely
 
 STIFFEN, FORGET = 1.0, 0.1
 MOST_ROUNDS = 6
 """Rounds of closing."""
-CLOSED_TO = TOLERANCES.sub_stepping.closing_residual
 
 
 @jit
@@ -102,11 +100,11 @@ def carry_supports(bodies, now, supports, h):
 
 @jit_making_arrays
 def hard_rows(joints, which, start):
-    """Places, from `start` on, of the rows of joints that are hard and no limits."""
+    """Places, from `start` on, of the rows of joints that are hard and have no bounds."""
     found, i, m = np.empty(joints.coordinate.shape[0], np.int64), start, 0
     for j in which:
         for k in range(joints.first[j], joints.first[j + 1]):
-            if joints.stiffness[k] == np.inf and limit_side(joints, k) == 0.0:
+            if joints.stiffness[k] == np.inf and joints.lower[k] == -np.inf and joints.upper[k] == np.inf:
                 found[m] = i
                 m += 1
             i += 1
@@ -114,15 +112,20 @@ def hard_rows(joints, which, start):
 
 
 @jit_making_arrays
-def fly_and_close(island, bodies, rows, start, begin, landed, h):
+def fly_and_close(island, bodies, rows, free, flight, h):
     """Fly, and change velocities and impulses until the hard rows are closed; returns what is left, m or rad.
 
-    rows: of the island at the start of the sub-step, those of joints from `start` on. begin, landed: see `fly`.
+    rows: of the island at the start of the sub-step, those of its joints at the end; free: `FreeRows` of them. flight: begin and landed,
+    see `fly`.
     """
     joints, which, now, members = island.joints, island.which, island.bodies, island.members
-    hard, value = hard_rows(joints, which, start), np.empty(rows.bias.shape[0] - start)
-    closing, worst = take_rows(rows, hard), 0.0
-    factored = prepare(closing, members.shape[0])
+    value, (begin, landed) = np.empty(count_joint_rows(joints, which)), flight
+    start = rows.bias.shape[0] - value.shape[0]
+    hard, worst = hard_rows(joints, which, start), 0.0
+    closing = take_rows(rows, hard)
+    # Springs without bounds are FREE, too, and have no place in closing.
+    alone = take_free(free, hard) if hard.shape[0] == count_free(rows) else factor_free(closing, members.shape[0])
+    y, change = np.empty((members.shape[0], 6)), np.empty(hard.shape[0])
     for round_ in range(MOST_ROUNDS):
         fly(bodies, now, members, begin, landed, h)
         joint_values(joints, which, bodies.position, bodies.rotation, island.memory.angle, value)
@@ -133,7 +136,7 @@ def fly_and_close(island, bodies, rows, start, begin, landed, h):
             closing.bias[c], closing.impulse[c] = x / h, 0.0
         if worst <= island.allowed or round_ == MOST_ROUNDS - 1 or not np.isfinite(worst):
             break
-        solve_prepared(closing, factored, CLOSED_TO * island.allowed / h)
+        give(closing, alone, closing.bias, change, y)
         change_velocities(now, members, closing)
         for c in range(hard.shape[0]):
             rows.impulse[hard[c]] += closing.impulse[c]

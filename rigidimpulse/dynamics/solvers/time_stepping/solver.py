@@ -32,6 +32,7 @@ from rigidimpulse.dynamics.constraints.joint import add_forces
 from rigidimpulse.dynamics.constraints.jointed_island import count_joint_rows
 from rigidimpulse.dynamics.constraints.rows import change_velocities, contact_rows
 from rigidimpulse.dynamics.constraints.slip import solve_until_slip
+from rigidimpulse.dynamics.solvers.free_rows import factor_free
 from rigidimpulse.dynamics.solvers.reduced import start_without_joints
 from rigidimpulse.dynamics.solvers.time_stepping.biases import fill_contact_biases, fill_joint_biases, fill_still_biases
 from rigidimpulse.dynamics.solvers.time_stepping.contact_points import (
@@ -212,11 +213,12 @@ def _sub_step(island, bodies, table, coefficients, balance, kept, flight, h):
     _set_friction(start_of, contacts, u, SLIP * scale)
     turned, fell = _turned(bodies, members), _falling(bodies, now, members)
     given = _energies(bodies, now, members, turned)
-    start_without_joints(rows, members.shape[0], ACCURATE * scale)
+    free = factor_free(rows, members.shape[0])
+    start_without_joints(rows, free, ACCURATE * scale)
     solve_until_slip(None, start_of, members.shape[0], contacts, ACCURATE * scale, SLIP * scale)
     change_velocities(now, members, rows)
     begin, spin, most = flight
-    gap = fly_and_close(island, bodies, rows, start, begin, spin, h)
+    gap = fly_and_close(island, bodies, rows, free, (begin, spin), h)
     # All that impulses did, those that close joints included: they act at the start. Half of the pull of gravity is in the velocities there
     # that acts after the flight: its share of the work is not theirs.
     given = _energies(bodies, now, members, turned) - given - 0.5 * h * (_falling(bodies, now, members) - fell)
@@ -307,6 +309,7 @@ def stop_island(island, bodies, table, coefficients, balance, kept):
     scale = _fastest(rows) + TINY
     turned = _turned(bodies, members)
     given = _energies(bodies, now, members, turned)
+    start_without_joints(rows, factor_free(rows, members.shape[0]), ACCURATE * scale)
     solve_until_slip(None, of_contacts, members.shape[0], contacts, ACCURATE * scale, SLIP * scale)
     change_velocities(now, members, rows)
     given = _energies(bodies, now, members, turned) - given
