@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import sleep
 
@@ -69,6 +69,15 @@ def test_recording_has_frames_until_stop(name: str, tmp_path: Path) -> None:
     assert not whole.status.is_partial
 
 
+@pytest.fixture
+def heard() -> Iterator[None]:
+    """Let Python hear Ctrl-C: what starts the tests in the background has it ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heard")
 def test_signal_in_a_program() -> None:
     """Ctrl-C itself ends the run between two steps, and means what it meant afterwards."""
     before = signal.getsignal(signal.SIGINT)
@@ -83,6 +92,7 @@ def test_signal_in_a_program() -> None:
     assert signal.getsignal(signal.SIGINT) is before
 
 
+@pytest.mark.usefixtures("heard")
 def test_second_signal_ends_at_once() -> None:
     """The second Ctrl-C is a KeyboardInterrupt wherever the run is."""
 
