@@ -29,8 +29,8 @@ from rigidimpulse.dynamics.solvers.sparse_lu import solve_factored
 MOST_ROWS, MOST_ROWS_A_BODY = 600, 12
 """With more rows than that, in all or over the number of bodies, G takes longer than what it saves."""
 MOST_SWEEPS = 200
-"""A sweep over the 60 rows of a ragdoll that lies on a stair takes 0.6 us, a step of Newton's method for its 100 rows 30 us. In a pile of six
-ragdolls, with 480 rows, all of a sub-step takes 6 ms; without sweeps it took 13."""
+"""A sweep over the 60 rows of a ragdoll that lies on a stair takes 0.6 us, a step of Newton's method for its 100 rows 30 us. In a pile of
+six ragdolls, with 480 rows, all of a sub-step takes 6 ms; without sweeps it took 13."""
 OVER = 1.2
 """Successive over-relaxation (Young 1954): with 1.4 as many sweeps as with 1, here a fifth less."""
 ENOUGH = 0.3
