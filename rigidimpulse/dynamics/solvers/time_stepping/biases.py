@@ -25,7 +25,7 @@ from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.joint import joint_rows, relative_point_velocity
 from rigidimpulse.dynamics.constraints.joint_limits import joint_weights, limit_side, spring_of
-from rigidimpulse.dynamics.constraints.rows import row_velocities, rows_of
+from rigidimpulse.dynamics.constraints.rows import BOUNDED, row_velocities, rows_of
 
 PUSH = 0.2
 """Part of what is too deep that is put right in a sub-step."""
@@ -101,6 +101,8 @@ def _soften(rows, r, spring, weight, x, sub_steps):
         share = pulls / h
         rows.impulse[r] = min(max(push, share * rows.lower[r]), share * rows.upper[r])
         rows.lower[r] = rows.upper[r] = rows.impulse[r]
+        # It is not FREE, or solvers that eliminate such rows would take it for a hard one.
+        rows.kind[r] = BOUNDED
         return
     rows.softness[r] = 1.0 / d
     rows.bias[r] -= push / d
@@ -137,5 +139,6 @@ def fill_still_biases(island, contacts, of_contacts, start, before):
                 pulls = 0.5 * before if _is_explicit(stiffness, weight[i], before) else 0.0
                 rows.impulse[r] = pulls * min(max(-stiffness * value[i], joints.lower[k]), joints.upper[k])
                 rows.lower[r] = rows.upper[r] = rows.impulse[r]
+                rows.kind[r] = BOUNDED
             i += 1
     return direction
