@@ -14,8 +14,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from rigidimpulse.collision.broad_phase import find_overlapping
-from rigidimpulse.collision.contact_records import ContactPairs
-from rigidimpulse.core.kernels import jit, jit_making_arrays
+from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, SUPPORT, ContactPairs, in_play
+from rigidimpulse.core.kernels import jit
 
 SLACK = 0.1
 """Slack in inner radii that every body gets in addition to what it needs."""
@@ -37,12 +37,14 @@ class BodyBounds(NamedTuple):
     high: np.ndarray  # (n, 3) m
 
 
-class _Fat(NamedTuple):
-    """Fat boxes of n bodies."""
+class Fat(NamedTuple):
+    """Fat boxes of n bodies, and scratch memory."""
 
     boxed: np.ndarray  # (n,) bool, the body has one
     centre: np.ndarray  # (n, 3) m
     slack: np.ndarray  # (n,) m
+    reach: np.ndarray  # (n,) m, scratch
+    path: np.ndarray  # (n,) inner radii, scratch
 
 
 class MovingBodies(Protocol):
@@ -75,23 +77,28 @@ def _path_length(velocity, acceleration, i, ahead):
 
 
 @jit
-def _left_fat_box(members, now, acceleration, bounds, ahead, fat):
-    """Whether a member may leave its fat box in `ahead` s, or has none."""
-    for i in members:
+def stay_in_boxes(bounds, fat, now, acceleration, part, ahead):
+    """Whether members stay in their fat boxes for `ahead` s, and supports have one; part: (n,) MEMBER, SUPPORT or OUTSIDE, by index."""
+    for i in range(part.shape[0]):
+        # A body that came to rest elsewhere counts as a member, since it moved.
+        if part[i] == OUTSIDE:
+            continue
         if not fat.boxed[i]:
-            return True
+            return False
+        if part[i] == SUPPORT:
+            continue
         away = 0.0
         for k in range(3):
             away += (now.position[i, k] - fat.centre[i, k]) ** 2
         if sqrt(away) + bounds.clearance[i] + _path_length(now.velocity, acceleration, i, ahead) > fat.slack[i]:
-            return True
-    return False
+            return False
+    return True
 
 
 @jit
 def _make_boxes(now, acceleration, bounds, ahead, fat, low, high):
     """Make fat boxes at the present positions, and write their corners (n, 3) by rank."""
-    boxed, centre, slack = fat
+    boxed, centre, slack = fat.boxed, fat.centre, fat.slack
     radius, inner, clearance = bounds.radius, bounds.inner, bounds.clearance
     for r in range(bounds.order.shape[0]):
         i = bounds.order[r]
@@ -125,18 +132,21 @@ def _drop_far(now, bounds, slack, pairs):
     return kept
 
 
-@jit_making_arrays
-def _near_pairs(bounds, pairs, now, acceleration, ahead, member, other, out):
-    """Write pairs (a, b, may touch) by index, of members with each other and with others, that may meet in `ahead` s; their number.
+@jit
+def near_pairs(bounds, fat, pairs, now, acceleration, part, ahead, out):
+    """Write pairs (a, b, may touch) by index, of members with each other and with supports, that may meet in `ahead` s; their number.
 
-    member, other: (n,) bool; out (k, 3). Others stand almost still. The third number is 0 where the pair had no contact when its contacts
-    were last found, and the bodies move too little to make one.
+    part: (n,) MEMBER, SUPPORT or OUTSIDE, by index; out: (3, k). Supports stand almost still. The third number is 0 where the pair had no
+    contact when its contacts were last found, and the bodies move too little to make one. Returns -1 where the pairs do not hold all that
+    may meet, see `stay_in_boxes`.
     """
-    order, moves, radius = bounds.order, bounds.moves, bounds.radius
-    reach, x, count = radius.copy(), now.position, 0
-    path = np.zeros(radius.shape[0])
+    order, moves, radius, x = bounds.order, bounds.moves, bounds.radius, now.position
+    reach, path, count = fat.reach, fat.path, np.int64(0)
+    if not stay_in_boxes(bounds, fat, now, acceleration, part, ahead):
+        return np.int64(-1)
     for i in range(radius.shape[0]):
-        if member[i]:
+        reach[i], path[i] = radius[i], 0.0
+        if part[i] == MEMBER:
             reach[i] += bounds.clearance[i] + _path_length(now.velocity, acceleration, i, ahead)
             spin = 0.0
             for k in range(3):
@@ -146,7 +156,7 @@ def _near_pairs(bounds, pairs, now, acceleration, ahead, member, other, out):
             path[i] = ahead * (sqrt(path[i]) + radius[i] * sqrt(spin)) / bounds.inner[i]
     for p in range(pairs.first.shape[0]):
         i, j = order[pairs.first[p]], order[pairs.second[p]]
-        if not ((member[i] and (member[j] or other[j])) or (member[j] and other[i])):
+        if not in_play(part, i, j):
             continue
         apart = False
         # Moving bodies by their spheres, immovable ones by the box of their shape.
@@ -159,8 +169,8 @@ def _near_pairs(bounds, pairs, now, acceleration, ahead, member, other, out):
                 apart = apart or x[m, k] - reach[m] > bounds.high[f, k] or x[m, k] + reach[m] < bounds.low[f, k]
         if apart:
             continue
-        out[count, 0], out[count, 1] = i, j
-        out[count, 2] = pairs.count[p] > 0 or not pairs.known[p] or path[i] + path[j] > CLOSE
+        out[0, count], out[1, count] = i, j
+        out[2, count] = pairs.count[p] > 0 or not pairs.known[p] or path[i] + path[j] > CLOSE
         count += 1
     return count
 
@@ -184,22 +194,13 @@ class FatBoxes:
         """
         n = len(bounds.order)
         self.bounds, self._dynamic, self._may_collide = bounds, dynamic, may_collide
-        self._fat = _Fat(np.zeros(n, bool), np.zeros((n, 3)), np.zeros(n))
-        self._capacity = max(64, 16 * n)
+        self.fat = Fat(np.zeros(n, bool), np.zeros((n, 3)), *np.zeros((3, n)))
+        self._capacity, self._near = max(64, 16 * n), np.empty((3, 0), np.int64)
 
-    def renewed(
-        self, now: MovingBodies, acceleration: np.ndarray, members: np.ndarray, others: np.ndarray, ahead: float
-    ) -> tuple[np.ndarray, np.ndarray] | None:
-        """Ranks (k,) int32 of pairs that may meet, ascending, if they had to be searched; None if the pairs found before still hold.
-
-        members: (k,) bodies that move; others: (m,) bodies that stand.
-        """
-        bounds, fat = self.bounds, self._fat
-        # A body that came to rest elsewhere counts as a member, since it moved.
-        if np.all(fat.boxed[others]) and not _left_fat_box(members, now, acceleration, bounds, ahead, fat):
-            return None
-        fat.boxed[:] = ~self._dynamic
-        fat.boxed[members] = fat.boxed[others] = True
+    def renewed(self, now: MovingBodies, acceleration: np.ndarray, part: np.ndarray, ahead: float) -> tuple[np.ndarray, np.ndarray]:
+        """Ranks (k,) int32 of pairs that may meet, ascending, found anew; part: (n,) which bodies move and which stand."""
+        bounds, fat = self.bounds, self.fat
+        fat.boxed[:] = ~self._dynamic | (part != OUTSIDE)
         low, high = np.empty((2, len(bounds.order), 3))
         _make_boxes(now, acceleration, bounds, ahead, fat, low, high)
         pairs = find_overlapping(low, high, self._dynamic[bounds.order], self._capacity)
@@ -212,10 +213,10 @@ class FatBoxes:
             first, second = first[may], second[may]
         return first, second
 
-    def near(
-        self, pairs: ContactPairs, now: MovingBodies, acceleration: np.ndarray, member: np.ndarray, other: np.ndarray, ahead: float
-    ) -> np.ndarray:
-        """Pairs (a, b, may touch) by index, a of lower rank, of members with each other and others that may meet in `ahead` s, (3, k)."""
-        out = np.empty((len(pairs.first), 3), np.int64)
-        count = _near_pairs(self.bounds, pairs, now, acceleration, ahead, member, other, out)
-        return out[:count].T
+    def near(self, pairs: ContactPairs, now: MovingBodies, acceleration: np.ndarray, part: np.ndarray, ahead: float) -> np.ndarray | None:
+        """Pairs (a, b, may touch) by index, a of lower rank, that may meet in `ahead` s, (3, k); None where `pairs` must be renewed."""
+        if self._near.shape[1] < len(pairs.first):
+            self._near = np.empty((3, 2 * len(pairs.first)), np.int64)
+        count = near_pairs(self.bounds, self.fat, pairs, now, acceleration, part, ahead, self._near)
+        # A view would be of another type where it is whole.
+        return None if count < 0 else self._near[:, :count].copy()

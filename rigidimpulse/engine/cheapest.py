@@ -17,20 +17,107 @@ fast spinning top, which needs many pieces, stays exact, and a coin that rings d
 
 from __future__ import annotations
 
-from typing import Any
+from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
+
+from rigidimpulse.core.kernels import jit, jit_making_arrays
 
 PIECE, LOOK, JOINTED_PIECE = 15.0, 2.5, 40.0
 JOINTED_SOLVE, FLIGHT = 13.0, 4.0
 FIRST, FIRST_JOINTED = PIECE + LOOK, JOINTED_PIECE
 WORSE, FADING, FEW = 1.5, 0.98, 8
-CHEAP, SUBSTEPS_COST_MORE = "the exact regime costs less", "sub-steps cost more"
+NOT_REFUSED, ALONE, CHEAP, SUBSTEPS_COST_MORE = map(np.int64, range(4))
+"""Why an island stays exact, or becomes so again."""
+REASONS = ("", "alone", "the exact regime costs less", "sub-steps cost more")
+"""The same in words."""
+APART, TOGETHER = -1, -2
+"""What is refused by itself, and all islands without joints, which are stepped together; islands with joints go by their root."""
 
 
-def exact_cost(solves: Any, size: Any) -> Any:
-    """What islands cost the exact regime in a step: the solves of a body in the mean, and the bodies."""
-    return solves * (1.0 + 0.5 * size) ** 1.5
+class Costs(NamedTuple):
+    """What is known of the costs of both regimes, of n bodies, in parts of about 0.1 ms."""
+
+    first: np.ndarray  # (n,) what sub-steps are expected to cost at first
+    limit: np.ndarray  # (n,) what they are expected to cost now
+    exact: np.ndarray  # (n,) what the exact regime took for the body's island when that began to be sub-stepped
+    pieces: np.ndarray  # (n,) pieces of the last step that the body was stepped in
+    looks: np.ndarray  # (n,) looks at contacts in them
+
+
+@jit
+def exact_cost(solves, size):
+    """What an island costs the exact regime in a step: the solves of a body in the mean, and the bodies."""
+    m = 1.0 + 0.5 * size
+    return solves * m * sqrt(m)
+
+
+@jit
+def _judge_group(costs, root, cost, was_substepped, group, which, reason):
+    """Judge the islands of a group, which are stepped together; writes the reason of those that are refused."""
+    inside, before, total, pieces, looks, limit, exact = 0, False, 0.0, 0.0, 0.0, 0.0, 0.0
+    for r in range(root.shape[0]):
+        if group[r] == which:
+            total += cost[r]
+    for i in range(root.shape[0]):
+        r = root[i]
+        if r < 0 or group[r] != which:
+            continue
+        inside += 1
+        limit = max(limit, costs.limit[i])
+        if was_substepped[r]:
+            before = True
+            pieces, looks, exact = max(pieces, costs.pieces[i]), max(looks, costs.looks[i]), max(exact, costs.exact[i])
+    spent = PIECE * pieces + LOOK * looks if which == TOGETHER else JOINTED_PIECE * pieces
+    # What came to them since then would have cost the exact regime, too.
+    saved = max(exact, total) if before else total
+    stays = spent <= WORSE * saved or inside >= FEW if before else total > limit
+    why = NOT_REFUSED if stays else SUBSTEPS_COST_MORE if before else CHEAP
+    for i in range(root.shape[0]):
+        r = root[i]
+        if r < 0 or group[r] != which:
+            continue
+        reason[r] = why
+        if stays:
+            costs.exact[i] = saved
+        elif before:
+            costs.limit[i] = spent
+
+
+@jit_making_arrays
+def judge_islands(costs, root, label, joined, touches, solve_count, reason):
+    """Write the reason (n,), by root, of islands that stay exact, or become so again; returns how many there are.
+
+    root: (n,) of every body, -1 for those in no island. label: (n,) the sub-stepped island that a body was in, -1 for none.
+    joined: (n,) bool. touches: (n,) bool by root. solve_count: (n,) how often the exact solver dealt with each body in the last step.
+    """
+    number, refused = root.shape[0], 0
+    size, group, cost = np.zeros(number, np.int64), np.full(number, APART, np.int64), np.zeros(number)
+    has_joints, was_substepped = np.zeros(number, np.bool_), np.zeros(number, np.bool_)
+    for i in range(number):
+        r = root[i]
+        reason[i] = NOT_REFUSED
+        if r >= 0:
+            size[r] += 1
+            cost[r] += solve_count[i]
+            has_joints[r] = has_joints[r] or joined[i]
+            was_substepped[r] = was_substepped[r] or label[i] >= 0
+    for r in range(number):
+        if size[r] > 0:
+            factor = 1.0 if not has_joints[r] else JOINTED_SOLVE if touches[r] else FLIGHT
+            cost[r] = factor * exact_cost(max(cost[r] / size[r], 1.0), size[r])
+            group[r] = r if has_joints[r] else TOGETHER if touches[r] else APART
+            reason[r] = ALONE if group[r] == APART else NOT_REFUSED
+    _judge_group(costs, root, cost, was_substepped, group, TOGETHER, reason)
+    for r in range(number):
+        if group[r] == r:
+            _judge_group(costs, root, cost, was_substepped, group, r, reason)
+    for i in range(number):
+        costs.pieces[i] = costs.looks[i] = 0.0
+        costs.limit[i] = max(FADING * costs.limit[i], costs.first[i])
+        refused += reason[i] != NOT_REFUSED
+    return refused
 
 
 class CheapestRegime:
@@ -38,77 +125,38 @@ class CheapestRegime:
 
     def __init__(self, joined: np.ndarray) -> None:
         """Nothing is known yet; joined (n,) bool: bodies with joints."""
-        self._first = np.where(joined, FIRST_JOINTED, FIRST)
-        self._limit = self._first.copy()
-        self._exact = np.zeros(len(joined))
-        self._pieces, self._looks = np.zeros((2, len(joined)))
+        first, none = np.where(joined, FIRST_JOINTED, FIRST), np.zeros((3, len(joined)))
+        self._costs = Costs(first, first.copy(), *none)
+        self._reason = np.zeros(len(joined), np.int64)
 
     def carry_on(self, earlier: CheapestRegime, old: np.ndarray, new: np.ndarray) -> None:
         """Know of bodies `new` (k,) what is known there of `old` (k,)."""
-        for name in ("_limit", "_exact", "_pieces", "_looks"):
-            getattr(self, name)[new] = getattr(earlier, name)[old]
+        for mine, theirs in zip(self._costs[1:], earlier._costs[1:], strict=True):
+            mine[new] = theirs[old]
 
     def note(self, members: np.ndarray, looks: int) -> None:
         """Members were stepped together over a piece of a step, with this number of looks at their contacts."""
-        self._pieces[members] += 1.0
-        self._looks[members] += looks
+        self._costs.pieces[members] += 1.0
+        self._costs.looks[members] += looks
 
     def handed_over(self, members: np.ndarray, solves: float) -> None:
         """Members were handed to sub-steps in the middle of a step, when the exact regime had solved one that often."""
-        self._exact[members] = exact_cost(solves, len(members))
+        self._costs.exact[members] = exact_cost.py_func(solves, len(members))
 
     def may_begin(self, solve_count: np.ndarray, moving: int, joined: np.ndarray) -> bool:
         """Whether any island may be worth sub-steps; moving: how many bodies can move, joined (n,) bool: have joints."""
         with_joints = FLIGHT if np.count_nonzero(joined) == 1 else JOINTED_SOLVE
         for bodies, factor in ((~joined, 1.0), (joined, with_joints)):
             size = min(moving, int(np.count_nonzero(bodies)))
-            if size and factor * exact_cost(max(float(solve_count[bodies].max()), 1.0), size) > float(self._limit[bodies].min()):
+            limit = self._costs.limit[bodies]
+            if size and factor * exact_cost.py_func(max(float(solve_count[bodies].max()), 1.0), size) > float(limit.min()):
                 return True
         return False
 
     def refusals(
-        self, root: np.ndarray, was: np.ndarray, joined: np.ndarray, touches: np.ndarray, solve_count: np.ndarray
+        self, root: np.ndarray, label: np.ndarray, joined: np.ndarray, touches: np.ndarray, solve_count: np.ndarray
     ) -> dict[int, str]:
-        """Why islands stay exact, or become so again, by their root.
-
-        Args:
-            root: (n,) of every body, -1 for those in no island. was: (n,) bool, members of sub-stepped islands. joined: (n,) bool.
-            touches: (n,) bool by root. solve_count: (n,) how often the exact solver dealt with each body in the last step.
-
-        """
-        members = np.flatnonzero(root >= 0)
-        size = np.bincount(root[members], minlength=len(root))
-        solves = np.bincount(root[members], weights=solve_count[members], minlength=len(root)) / np.maximum(size, 1)
-        has_joints, was_substepped = np.zeros((2, len(root)), bool)
-        has_joints[root[members[joined[members]]]] = True
-        was_substepped[root[members[was[members]]]] = True
-        factor = np.where(has_joints, np.where(touches, JOINTED_SOLVE, FLIGHT), 1.0)
-        cost = factor * exact_cost(np.maximum(solves, 1.0), size)
-        out = dict.fromkeys(np.flatnonzero((size > 0) & ~touches & ~has_joints).tolist(), "alone")
-        plain = (size > 0) & touches & ~has_joints
-        for together in (plain, *(np.arange(len(root)) == r for r in np.flatnonzero((size > 0) & has_joints).tolist())):
-            if together.any():
-                out.update(self._refused(together, root, cost, was_substepped, bool(has_joints[together].any())))
-        self._pieces[:] = self._looks[:] = 0.0
-        self._limit = np.maximum(FADING * self._limit, self._first)
-        return out
-
-    def _refused(self, together: np.ndarray, root: np.ndarray, cost: np.ndarray, was: np.ndarray, jointed: bool) -> dict[int, str]:
-        """The same for islands that are stepped together, (n,) bool by root."""
-        inside = (root >= 0) & together[root]
-        before = inside & was[root]
-        if not before.any():
-            total = float(cost[together].sum())
-            if total <= float(self._limit[inside].max()):
-                return dict.fromkeys(np.flatnonzero(together).tolist(), CHEAP)
-            self._exact[inside] = total
+        """Why islands stay exact, or become so again, by their root; see `judge_islands`."""
+        if not judge_islands(self._costs, root, label, joined, touches, solve_count, self._reason):
             return {}
-        pieces, looks = float(self._pieces[before].max()), float(self._looks[before].max())
-        spent = JOINTED_PIECE * pieces if jointed else PIECE * pieces + LOOK * looks
-        # What came to them since then would have cost the exact regime, too.
-        saved = max(float(self._exact[before].max()), float(cost[together].sum()))
-        if spent <= WORSE * saved or np.count_nonzero(inside) >= FEW:
-            self._exact[inside] = saved
-            return {}
-        self._limit[inside] = spent
-        return dict.fromkeys(np.flatnonzero(together).tolist(), SUBSTEPS_COST_MORE)
+        return {r: REASONS[self._reason[r]] for r in np.flatnonzero(self._reason).tolist()}

@@ -39,6 +39,8 @@ def sweep_with(method: str) -> Callable[[Run, PairEvents], None]:
 def sweep_stale_pairs(run: Run, pair_events: PairEvents, method: Callable[..., Any]) -> None:
     """Sweep the pairs that ask for it, until the next event is known, and note when they come to contact."""
     table, step, end = pair_events.table, run.world.accuracy.step, pair_events.end
+    if not len(pair_events.pairs):
+        return
     places, asked = pairs_to_sweep(table, step, end)
     while len(places):
         found = run.narrow_phase.sweep(run, method, asked, end)

@@ -169,6 +169,8 @@ class PairEvents:
         """The same for the members of sub-stepped islands, all at once."""
         run, pairs = self.run, self.pairs
         free = run.world.dynamic & ~self.inside
+        if not (len(pairs) or free.any()):
+            return
         moved = np.zeros(run.world.num_bodies, bool)
         moved[bodies] = True
         known = np.flatnonzero(moved[pairs["a"]] | moved[pairs["b"]])
@@ -212,6 +214,8 @@ class PairEvents:
 
     def count_contacts(self, time: float) -> None:
         """Count contacts at one instant; a pair with too many is handed to sub-steps, or left alone until the step ends, and reported."""
+        if not len(self.pairs):
+            return
         given_up = np.empty(len(self.pairs), np.int64)
         count = count_contacts(self.table, time, INSTANT * self.run.world.accuracy.step, given_up)
         for place in self._left_alone(given_up[:count], time).tolist():
@@ -251,6 +255,8 @@ class PairEvents:
 
     def settle(self, time: float) -> None:
         """Pairs that came to contact without consequence are swept again from here with a smaller gap."""
+        if not len(self.pairs):
+            return
         given_up = np.empty(len(self.pairs), np.int64)
         count = settle_pairs(self.table, time, self._dynamic, given_up)
         self.report(time, "contact not resolved", self._left_alone(given_up[:count], time), NOT_RESOLVED_REMEDY)

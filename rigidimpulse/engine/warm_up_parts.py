@@ -32,6 +32,7 @@ from rigidimpulse.dynamics.constraints.rolling_friction import NO_ROLLING, rolli
 from rigidimpulse.dynamics.constraints.rows import change_velocities, changes_of, contact_rows, make_rows, response_to, row_velocities
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.engine.begin import make_plan, make_run
+from rigidimpulse.engine.cheapest import CheapestRegime
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.exact.compiled_loop import CompiledLoop
 from rigidimpulse.engine.exact.energy_limit import limit_energy, note_end_energy
@@ -42,13 +43,15 @@ from rigidimpulse.engine.exact.step_size import Forces, StepLimits, Turning, est
 from rigidimpulse.engine.exact.trajectories import set_impact_margins, take_steady_load
 from rigidimpulse.engine.islands import touching_islands
 from rigidimpulse.engine.pair_events import PairEvents
-from rigidimpulse.engine.regime import TALL, Judged, island_roots, refusals, support_levels
+from rigidimpulse.engine.regime import TALL, Judged, refusals, support_levels
 from rigidimpulse.engine.run import Run, start_trajectories
-from rigidimpulse.engine.sleeping import advance_sleep_timers, stands_still, wake_by_contact
+from rigidimpulse.engine.sleeping import advance_sleep_timers, stands_still
 from rigidimpulse.engine.spheres.run import EventRun
 from rigidimpulse.engine.step import step
 from rigidimpulse.engine.substepped.contact_forces import COARSE, ContactStepper
+from rigidimpulse.engine.substepped.island_step import energies_of_islands
 from rigidimpulse.engine.substepped.jointed import JointedStepper
+from rigidimpulse.engine.substepped.membership import Candidates, connect_members, gather_members, settle_islands
 from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.warm_up import (
@@ -216,23 +219,26 @@ def _stand_beside_sub_steps(run: Run) -> None:
     """What sub-stepped islands call beside their steps: pairs, which of them are stepped, trajectories between the steps."""
     world, state, members, member = run.world, run.state, np.array([1]), np.array([False, True])
     stepper = ContactStepper(world, world.dynamic, COARSE)
-    for _ in range(2):  # The second time there is a cover.
-        stepper.find_pairs(run, members, np.array([0]), STEP)
-    stepper.near(run, member, ~member, STEP)
+    near = stepper.near(run, member, STEP)
     stepper.table.free[:, 0] = stepper.table.free[:, 1]
     stepper.table.pack()
-    # Columns of one row only would be another type.
-    a, b = np.array([[0, 1], [0, 1]]).T
-    root = island_roots(world.num_bodies, a, b, member)
-    refusals(world, Judged(root, member, ~member, member, member, np.zeros(world.num_bodies)), (a, b), True)
+    label, none, links = np.array([-1, 1]), np.zeros(world.num_bodies), np.zeros((0, 2), np.int64)
+    root, steady = np.zeros(world.num_bodies, np.int64), world.steady_acceleration
+    candidates = Candidates(
+        world.dynamic, world.moving, ~member, world.mass, stepper.inner, steady, world.steady_strength, label, none, ~member
+    )
+    gather_members(run.motion, candidates, 0.0, (1.0, 1.0), member)
+    connect_members(near, links, member, root, ~member)
+    settle_islands(state.now, candidates, near, links, member, root, ~member, 1.0)
+    CheapestRegime(~member).refusals(root, label, ~member, member, none)
+    energies_of_islands(state.now, world.constants, members, label, none)
+    refusals(world, Judged(root, member, ~member, member, member, none), (near[0], near[1]), True)
     support_levels(stepper.bodies, stepper.table.pairs, stepper.table.points, TALL)
-    steady, poses, now = world.steady_acceleration, (np.zeros((1, 3)), np.zeros((1, 4)), np.zeros((1, 6))), state.now
+    poses, now = (np.zeros((1, 3)), np.zeros((1, 4)), np.zeros((1, 6))), state.now
     end_trajectories(state.trajectory, members, 0.0, steady, now, state.rotation, run.acceleration, run.angular_acceleration)
     depart(state.trajectory, members, 0.0, STEP, now, *poses)
     let_fly(state.trajectory, members, steady)
-    pair = np.array([0])
-    wake_by_contact(pair, pair, ~member, ~member, now, world.mass, world.steady_strength, stepper.inner)
-    mark_slow(now, stepper.inner, 1.0, 1.0, np.array([False, True]))
+    mark_slow(now, stepper.inner, (1.0, 1.0), np.array([False, True]))
     most_stray(now, members, stepper.pressed, stepper.reach, stepper.skin, 0.5)
     of_sleep = world.steady_strength, stepper.inner, stepper.skin
     advance_sleep_timers(members, poses, of_sleep, STEP, np.zeros((2, 7)), np.zeros(2))
@@ -303,7 +309,7 @@ def _step_jointed(run: Run) -> None:
     joints = JointedStepper(run, stepper)
     run.state.now.inv_inertia[1] = np.eye(3)
     member, support = np.array([[1], [0]])
-    joints.step(run, member, (0.0, STEP), lambda fineness: stepper.set_up(run, member, support, STEP, fineness=fineness))
+    joints.step(run, member, (0.0, STEP), lambda fineness: stepper.load(run, member, support, STEP, fineness=fineness))
 
 
 def _step_any_shapes(run: Run) -> None:

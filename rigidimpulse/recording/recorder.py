@@ -103,7 +103,12 @@ AT_ONCE = 16
 
 
 class Recorder:
-    """Frames of n bodies in the principal frame: position (f, n, 3), orientation (f, n, 4), velocities (f, n, 3)."""
+    """Frames of n bodies in the principal frame: position (f, n, 3), orientation (f, n, 4), velocities (f, n, 3).
+
+    Attributes:
+        frames: all of them, written or not. written: (n,) how many of each body are.
+
+    """
 
     def __init__(self, times: np.ndarray, num_bodies: int) -> None:
         """times (f,) s, increasing."""
@@ -114,11 +119,8 @@ class Recorder:
         self.angular_velocity = np.zeros((len(times), num_bodies, 3))
         self.written = np.zeros(num_bodies, np.int64)
         self._everyone = np.arange(num_bodies)
-
-    @property
-    def frames(self) -> Frames:
-        """All frames, written or not."""
-        return Frames(self.times, self.position, self.orientation, self.velocity, self.angular_velocity)
+        # The same tuple in all calls: they are quicker by it.
+        self.frames = Frames(times, self.position, self.orientation, self.velocity, self.angular_velocity)
 
     def start(self, trajectory: Trajectories) -> None:
         """Write frame 0, the state as given."""
@@ -149,6 +151,7 @@ class Recorder:
         """Leave the first `count` frames only."""
         self.times, self.position, self.orientation = self.times[:count], self.position[:count], self.orientation[:count]
         self.velocity, self.angular_velocity = self.velocity[:count], self.angular_velocity[:count]
+        self.frames = Frames(self.times, self.position, self.orientation, self.velocity, self.angular_velocity)
         self.written = np.minimum(self.written, count)
 
     def finish(self, trajectory: Trajectories) -> None:
@@ -158,4 +161,5 @@ class Recorder:
         self.flush_all(trajectory, self._everyone, np.inf)
 
     def _write(self, trajectory: Trajectories, bodies: np.ndarray, last: int) -> None:
-        sample_paths(trajectory, bodies, last, self.written, self.frames)
+        if len(bodies) and self.written[bodies].min() < last:
+            sample_paths(trajectory, bodies, last, self.written, self.frames)

@@ -25,6 +25,8 @@ NOT_HELD = np.zeros(6), np.zeros(6)
 
 def arrive(run: Run, islands: list[Island], time: float, bodies: np.ndarray) -> None:
     """End the sub-steps of all bodies that were brought to `time` with these islands."""
+    if not len(bodies):
+        return
     for island in islands:
         if project_velocities(run, island):
             classify(run, island)

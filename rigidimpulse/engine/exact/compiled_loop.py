@@ -166,6 +166,8 @@ class CompiledLoop:
         event, and those of its bodies that are left to the loop in Python.
         """
         mark, (time, bodies), how = np.zeros(run.world.num_bodies, bool), event, NO_CAPACITY
+        if not len(bodies):  # a step begins with sub-stepped islands alone
+            return event
         self._elsewhere[:] = _of_python(run)
         if run.solve_rows is not None or self._elsewhere[bodies].all():
             return event

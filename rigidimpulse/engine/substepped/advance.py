@@ -48,10 +48,12 @@ from rigidimpulse.engine.regime import (
     support_levels,
 )
 from rigidimpulse.engine.run import Run
-from rigidimpulse.engine.sleeping import advance_sleep_timers, wake_by_contact
+from rigidimpulse.engine.sleeping import advance_sleep_timers
 from rigidimpulse.engine.substepped.contact_forces import COARSE, FINE, FINEST, ContactStepper, Fineness, Outcome
 from rigidimpulse.engine.substepped.hand_over import HandOver
+from rigidimpulse.engine.substepped.island_step import energies_of_islands
 from rigidimpulse.engine.substepped.jointed import JointedStepper
+from rigidimpulse.engine.substepped.membership import Candidates, connect_members, gather_members, settle_islands
 from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
 from rigidimpulse.engine.substepped.waypoints import Flown, Way, part_of, way_of, write_frames
@@ -73,12 +75,14 @@ MOST_PIECES = 4
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the island that comes near it."""
 
+NONE = np.zeros(0, np.int64)
+
+
 class _Began(NamedTuple):
     """The step that an island is in."""
 
     time: float  # s, of its start
     end: float  # s
-    members: np.ndarray  # (k,)
     energy: float  # J, at its start
     taken: float  # J that the balance of energy takes off until its end
     raised: float  # J that bodies gain until then by rising out of each other, and cannot pay
@@ -115,6 +119,8 @@ class SubsteppedIslands:
         self.label = np.full(world.num_bodies, -1, np.int64)
         self.sleep_timer = np.zeros(world.num_bodies)
         self.asleep = np.zeros(world.num_bodies, bool)
+        self._energy = np.zeros(world.num_bodies)
+        self._root, self._touches = np.zeros(world.num_bodies, np.int64), np.zeros(world.num_bodies, bool)
         self._stood = np.full((world.num_bodies, 7), np.inf)
         self._taken = np.zeros(world.num_bodies, bool)
         self._auto = solver == "auto"
@@ -135,9 +141,19 @@ class SubsteppedIslands:
         return ContactStepper(self._world, self._movable, self._parts, self._sharing)
 
     @cached_property
-    def _sub_step_of_all(self) -> float:
-        """Length of the sub-steps that all movable bodies together would have, s."""
-        return self.stepper.sub_step(np.flatnonzero(self._world.dynamic))
+    def _limits(self) -> tuple[float, float]:
+        """Beyond what bodies are too fast for the sub-steps that all movable bodies together would have, see `is_slow`."""
+        h = self.stepper.sub_step(np.flatnonzero(self._world.dynamic))
+        return FAST / h, SPIN / h
+
+    @cached_property
+    def _candidates(self) -> Candidates:
+        """What is known of the bodies where members are chosen."""
+        world = self._world
+        return Candidates(
+            world.dynamic, world.moving, self._jointed, world.mass, self.stepper.inner, world.steady_acceleration, world.steady_strength,
+            self.label, self.sleep_timer, self.asleep,
+        )  # fmt: skip
 
     @property
     def counts(self) -> SolveCounts:
@@ -184,84 +200,82 @@ class SubsteppedIslands:
         world, trajectory, time = run.world, run.state.trajectory, pair_events.begin
         ended = trajectory.mode == LINEAR
         self._end_trajectories(run, np.flatnonzero(ended), time)
-        chosen = self._choose(run, pair_events, ended, solve_count) if pair_events.end > time else np.zeros_like(ended)
+        chosen = self._choose(run, pair_events, solve_count) if pair_events.end > time else np.zeros_like(ended)
         # Members that are in no island any more fly freely.
         left = np.flatnonzero(ended & ~chosen & (trajectory.mode == LINEAR))
-        let_fly(trajectory, left, world.steady_acceleration)
-        self.sleep_timer[left] = 0.0
+        if len(left):
+            let_fly(trajectory, left, world.steady_acceleration)
+            self.sleep_timer[left] = 0.0
         self._taken &= chosen
         self.asleep &= chosen
         pair_events.inside |= chosen
         pair_events.asleep |= (self.label >= 0) & (trajectory.mode == FIXED)
 
-    def _choose(self, run: Run, pair_events: PairEvents, brought: np.ndarray, solve_count: np.ndarray) -> np.ndarray:
-        """Which bodies (n,) bool are stepped; those `brought` are at the begin of the step already."""
-        world, trajectory, time = run.world, run.state.trajectory, pair_events.begin
-        member = world.dynamic & ((trajectory.mode != FIXED) | self.asleep)
-        if not member.any():
+    def _choose(self, run: Run, pair_events: PairEvents, solve_count: np.ndarray) -> np.ndarray:
+        """Which bodies (n,) bool are stepped; those whose trajectories ended are at the begin of the step already."""
+        world, time, candidates, root = run.world, pair_events.begin, self._candidates, self._root
+        member = np.empty(world.num_bodies, bool)
+        number, left, resting = gather_members(run.motion, candidates, time, self._limits, member)
+        if number == 0:
             return member
-        ahead = pair_events.end - time
-        bring_all(
-            trajectory, np.flatnonzero(~(brought | self.asleep)), time, run.state.now, run.state.rotation, run.acceleration,
-            run.angular_acceleration,
-        )  # fmt: skip
-        run.acceleration[world.dynamic] = world.steady_acceleration[world.dynamic]
-        before = member.copy()
-        self._leave_out_fast(run, member)
-        member |= self.stepper.inside_others(run, before & ~member & (self.label >= 0))
-        a, b, touch = self._near(run, member, ahead)
+        if left:
+            before = world.dynamic & ((run.state.trajectory.mode != FIXED) | self.asleep)
+            member |= self.stepper.inside_others(run, before & ~member & (self.label >= 0))
+        near = self.stepper.near(run, member, pair_events.end - time)
         # A member may touch a sleeping island, whose bodies then touch others.
-        while len(woken := self._touched(run, member, a, b)):
+        while resting and len(woken := self._touched(run, member, near)):
             member[woken] = True
-            a, b, touch = self._near(run, member, ahead)
+            near = self.stepper.near(run, member, pair_events.end - time)
         links = run.joints.links()
-        root = island_roots(world.num_bodies, np.append(a, links[:, 0]), np.append(b, links[:, 1]), member)
-        root[~member] = -1
-        moves = lively(run.state.now, world.steady_strength, self.stepper.inner)
+        connect_members(near, links, member, root, self._touches)
         joined = np.zeros_like(member)
-        joined[run.joints.bodies_of(run.joints.at(np.flatnonzero(member & self._jointed)))] = True
-        if self.hand_over.cheapest is not None:
-            touches = np.zeros(world.num_bodies, bool)
-            touches[np.where(root[a] >= 0, root[a], root[b])] = True
-            refused = self.hand_over.cheapest.refusals(root, self.label >= 0, joined, touches, solve_count)
-        else:
-            judged = Judged(root, self.label >= 0, joined, _struck(run, joined, time), moves, solve_count)
-            refused = refusals(world, judged, (a, b), self._auto)
-        inside = self.stepper.inside_others(run, member & (self.label >= 0) & np.isin(root, list(refused)))
-        refused = {r: reason for r, reason in refused.items() if r not in root[inside]}
-        refused.update(dict.fromkeys(np.unique(root[member & self.hand_over.open]).tolist(), "joints that sub-steps do not close"))
+        if len(links):
+            joined[run.joints.bodies_of(run.joints.at(np.flatnonzero(member & self._jointed)))] = True
+        refused = self._refusals(run, pair_events, near, member, joined, solve_count)
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
         # Tall columns are found from contacts, so only in islands that are not refused yet.
-        exempt = joined | (solves_in_islands(root, solve_count) > EXPENSIVE_TALL)[root] | crowded(root, a[touch > 0])[root]
-        chosen = self._low(run, pair_events, chosen, root, exempt, refused)
+        if self._auto and np.any(chosen & (self.label < 0)):
+            exempt = joined | (solves_in_islands(root, solve_count) > EXPENSIVE_TALL)[root] | crowded(root, near[0, near[2] > 0])[root]
+            chosen = self._low(run, pair_events, chosen, root, exempt, refused)
         for reason in refused.values():
             self._refused[reason] = self._refused.get(reason, 0) + 1
-        self.label[member & ~chosen] = -1
-        holds = touch > 0
-        self._settle(run, chosen, root, np.append(a[holds], links[:, 0]), np.append(b[holds], links[:, 1]), time)
+        if refused:
+            self.label[member & ~chosen] = -1
+        self._settle(run, chosen, near, links, time)
         return chosen
+
+    def _refusals(
+        self, run: Run, pair_events: PairEvents, near: np.ndarray, member: np.ndarray, joined: np.ndarray, solve_count: np.ndarray
+    ) -> dict[int, str]:
+        """Why islands stay exact, by their root; but for tall ones, see `_low`."""
+        world, root = run.world, self._root
+        if self.hand_over.cheapest is not None:
+            refused = self.hand_over.cheapest.refusals(root, self.label, joined, self._touches, solve_count)
+        else:
+            moves = lively(run.state.now, world.steady_strength, self.stepper.inner)
+            judged = Judged(root, self.label >= 0, joined, _struck(run, joined, pair_events.begin), moves, solve_count)
+            refused = refusals(world, judged, (near[0], near[1]), self._auto)
+        if refused:
+            inside = self.stepper.inside_others(run, member & (self.label >= 0) & np.isin(root, list(refused)))
+            refused = {r: reason for r, reason in refused.items() if r not in root[inside]}
+        if self.hand_over.open.any():
+            refused.update(dict.fromkeys(np.unique(root[member & self.hand_over.open]).tolist(), "joints that sub-steps do not close"))
+        return refused
 
     def _leave_out_fast(self, run: Run, member: np.ndarray) -> None:
         """Unmark those that are too fast for sub-steps; what joints join stays together, and is given more of them."""
-        h, joined = self._sub_step_of_all, member & self._jointed
-        mark_slow(run.state.now, self.stepper.inner, FAST / h, SPIN / h, member)
+        joined = member & self._jointed
+        mark_slow(run.state.now, self.stepper.inner, self._limits, member)
         member |= joined
 
-    def _near(self, run: Run, member: np.ndarray, ahead: float) -> np.ndarray:
-        """Pairs (3, k) of members that may meet something in `ahead` s."""
-        # Movable bodies under way that are no members are swept.
-        other = ~member & ~(run.world.dynamic & (run.state.trajectory.mode != FIXED))
-        self.stepper.find_pairs(run, np.flatnonzero(member), np.flatnonzero(other), ahead)
-        return self.stepper.near(run, member, other, ahead)
-
-    def _touched(self, run: Run, member: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    def _touched(self, run: Run, member: np.ndarray, near: np.ndarray) -> np.ndarray:
         """Bodies at rest that members touch, and all of the islands they belong to."""
         world, links = run.world, run.joints.links()
         resting = world.dynamic & ~member & (run.state.trajectory.mode == FIXED)
-        which = np.flatnonzero(resting[a] | resting[b])
+        which = np.flatnonzero(resting[near[0]] | resting[near[1]])
         if not len(which):
             return which
-        a, b = a[which], b[which]
+        a, b = near[0, which], near[1, which]
         margin = TOUCHES * np.minimum(self.stepper.skin[a], self.stepper.skin[b])
         buffer = run.contact_buffer
         shapes = Shapes(self.stepper.smaller.geometry, self.stepper.smaller.of_body[world.num_bodies :])
@@ -284,57 +298,28 @@ class SubsteppedIslands:
         begins &= ~np.isin(root, np.unique(root[chosen & ~begins]))
         if not begins.any():
             return chosen
-        self._set_up(run, np.flatnonzero(begins), pair_events.begin, pair_events.end - pair_events.begin, 0.0)
         stepper = self.stepper
+        self._load(run, np.flatnonzero(begins), pair_events.begin, pair_events.end - pair_events.begin, 0.0)
+        stepper.look(run)
         level = support_levels(stepper.bodies, stepper.table.pairs, stepper.table.points, TALL)
         tall = np.unique(root[stepper.order[level[: len(root)] == TALL + 1]])
         tall = tall[tall >= 0]
         refused.update(dict.fromkeys(tall.tolist(), "tall"))
         return chosen & ~np.isin(root, tall)
 
-    def _settle(self, run: Run, chosen: np.ndarray, root: np.ndarray, a: np.ndarray, b: np.ndarray, time: float) -> None:
-        """Label the islands; put to sleep those that have been sleepy for long, and members that are far from moving ones.
-
-        a, b (k,): bodies that touch each other, or that joints join.
-        """
-        world, trajectory = run.world, run.state.trajectory
-        inner = self.stepper.inner
-        # Islands on moving supports never sleep.
-        carried = world.moving[a] | world.moving[b]
-        moving = np.unique(root[np.where(world.moving[a], b, a)[carried]])
-        restless = chosen.copy()
-        for r in np.unique(root[chosen]).tolist():
-            members = np.flatnonzero(chosen & (root == r))
-            self.label[members] = r
-            strength = float(world.steady_strength[members].max())
-            if strength > 0.0 and r not in moving and not self._is_driven(run, members):
-                restless[members] = self.sleep_timer[members] < self._rest * np.sqrt(inner[members] / strength)
-        restless = self._with_joined(run, chosen, restless)
-        if np.array_equal(restless, chosen):
-            self.asleep[:] = False
-            return
-        now, strength = run.state.now, world.steady_strength
-        awake = wake_by_contact(a, b, chosen, restless, now, world.mass, strength, inner)
-        asleep = chosen & ~self._with_joined(run, chosen, awake)
-        self._put_to_sleep(run, np.flatnonzero(asleep & (trajectory.mode != FIXED)), time)
-        alive = np.zeros(len(root), bool)
-        alive[root[restless]] = True
-        # Islands whose members all sleep are not stepped.
-        chosen &= alive[root]
-        self.asleep = asleep & chosen
+    def _settle(self, run: Run, chosen: np.ndarray, near: np.ndarray, links: np.ndarray, time: float) -> None:
+        """Label the islands; put to sleep those that have been sleepy for long, and members that are far from moving ones."""
+        root, driven = self._root, np.zeros_like(chosen)
+        if len(links):
+            for r in np.unique(root[chosen & self._jointed]).tolist():
+                driven[r] = self._is_driven(run, np.flatnonzero(chosen & (root == r)))
+        sleeps = settle_islands(run.state.now, self._candidates, near, links, chosen, root, driven, self._rest)
+        self._put_to_sleep(run, np.flatnonzero(sleeps & (run.state.trajectory.mode != FIXED)) if len(sleeps) else NONE, time)
 
     def _is_driven(self, run: Run, members: np.ndarray) -> bool:
         """Whether joints of members hang from something that moves, or will let go."""
         which = run.joints.at(members[self._jointed[members]])
         return bool(len(which)) and (bool(run.world.moving[run.joints.bodies_of(which)].any()) or run.joints.will_let_go(which))
-
-    def _with_joined(self, run: Run, chosen: np.ndarray, marked: np.ndarray) -> np.ndarray:
-        """What is marked, (n,) bool, with the chosen bodies that joints join to it."""
-        links = run.joints.links()
-        if not len(links):
-            return marked
-        joined = island_roots(run.world.num_bodies, links[:, 0], links[:, 1], chosen)
-        return marked | (chosen & np.isin(joined, joined[chosen & marked]))
 
     def _put_to_sleep(self, run: Run, members: np.ndarray, time: float) -> None:
         """Let members stay where they are."""
@@ -363,21 +348,22 @@ class SubsteppedIslands:
             state.trajectory, members, time, world.steady_acceleration, state.now, state.rotation, run.acceleration,
             run.angular_acceleration,
         )  # fmt: skip
+        energies_of_islands(state.now, world.constants, members, self.label, self._energy)
         for label in labels:
-            self._account(run, label, time)
+            if label in self._began:
+                self._account(run, self._began.pop(label), float(self._energy[label]), time)
 
-    def _account(self, run: Run, label: int, time: float) -> None:
-        if label in self._began:
-            began = self._began.pop(label)
-            change = mechanical_energy(run.state.now, run.world.constants, began.members) - began.energy
-            # Trajectories that end early have had their share of it.
-            share = (time - began.time) / (began.end - began.time)
-            run.log.account_over(began.time, time, "energy correction", -began.taken * share)
-            run.log.account_over(began.time, time, "position correction", began.raised * share)
-            run.log.account_over(began.time, time, "joints", began.given * share)
-            run.log.account_over(began.time, time, "sub-stepping", change - (began.raised - began.taken + began.given) * share)
-            if len(began.joints) and time > began.time:
-                run.joints.account_sub_steps(began.joints, began.time, time)
+    def _account(self, run: Run, began: _Began, energy: float, time: float) -> None:
+        """Account for a step that ends at `time` with an energy, J."""
+        change = energy - began.energy
+        # Trajectories that end early have had their share of it.
+        share = (time - began.time) / (began.end - began.time)
+        run.log.account_over(began.time, time, "energy correction", -began.taken * share)
+        run.log.account_over(began.time, time, "position correction", began.raised * share)
+        run.log.account_over(began.time, time, "joints", began.given * share)
+        run.log.account_over(began.time, time, "sub-stepping", change - (began.raised - began.taken + began.given) * share)
+        if len(began.joints) and time > began.time:
+            run.joints.account_sub_steps(began.joints, began.time, time)
 
     def finish(self, run: Run) -> None:
         """Account for the energy of sub-steps that last until the end of the run, and tell the plan what was done."""
@@ -434,9 +420,9 @@ class SubsteppedIslands:
         state, time = run.state, island.time
         stepped = state.trajectory.mode[members] == LINEAR
         self._end_trajectories(run, members[stepped & (state.trajectory.start[members] < time)], time)
-        away = np.setdiff1d(members[~(stepped | self.asleep[members])], island.members)
-        bring_all(state.trajectory, away, time, state.now, state.rotation, run.acceleration, run.angular_acceleration)
-        run.acceleration[away] = run.world.steady_acceleration[away]
+        if len(away := np.setdiff1d(members[~(stepped | self.asleep[members])], island.members)):
+            bring_all(state.trajectory, away, time, state.now, state.rotation, run.acceleration, run.angular_acceleration)
+            run.acceleration[away] = run.world.steady_acceleration[away]
         island.substepped = members
 
     def contact_forces(self, run: Run, pair_events: PairEvents, island: Island) -> None:
@@ -463,7 +449,7 @@ class SubsteppedIslands:
         """Step an island from its time until its trajectories must begin again."""
         world, members = run.world, island.substepped
         assert members is not None
-        run.contact_log.close(np.union1d(island.members, members), island.time)
+        run.contact_log.close(np.union1d(island.members, members) if len(island.members) else members, island.time)
         if len(island.members):
             stays = np.zeros(world.num_bodies, bool)
             stays[island.members] = True
@@ -482,11 +468,11 @@ class SubsteppedIslands:
             self.asleep[members] = pair_events.asleep[members] = False
             self.sleep_timer[island.members] = 0.0
         fresh = members[~self._taken[members]]
-        self._take_in(run, fresh, island.time)
+        if len(fresh):
+            self._take_in(run, fresh, island.time)
         self._most = max(self._most, len(members))
         members = members[~self.asleep[members]]
-        joints = run.joints.at(members[self._jointed[members]])
-        if len(joints):
+        if self._jointed.any() and len(joints := run.joints.at(members[self._jointed[members]])):
             run.joints.break_at(run, joints, island.time)
         # In the middle of a step contacts may be kept for longer motion.
         kept = self.stepper.kept if island.time > pair_events.begin else 0.0
@@ -494,7 +480,7 @@ class SubsteppedIslands:
         for part in self._solved_together(run, pair_events, members):
             self._steps += 1
             end = self._end_of(run, pair_events, island.time, part)
-            out = self._step(run, part, np.intersect1d(fresh, part), (island.time, end), kept)
+            out = self._step(run, part, np.intersect1d(fresh, part) if len(fresh) else fresh, (island.time, end), kept)
             if out is None:
                 self._give_back(run, pair_events, part, island.time)
                 continue
@@ -536,8 +522,9 @@ class SubsteppedIslands:
         if len(which):
             out = self._step_jointed(run, members, span, kept)
         else:
-            self._set_up(run, members, time, end - time, kept)
+            self._load(run, members, time, end - time, kept)
             if len(fresh):
+                self.stepper.look(run)
                 before = mechanical_energy(run.state.now, run.world.constants, members)
                 self.stepper.move_apart(run, fresh, time)
                 change = mechanical_energy(run.state.now, run.world.constants, members) - before
@@ -547,16 +534,14 @@ class SubsteppedIslands:
             self.hand_over.cheapest.note(members, self.stepper.parts)
         if out is None:
             return None
-        amounts = np.zeros((3, run.world.num_bodies))
-        amounts[:, out.members] = out.taken, out.raised, out.given
         way = way_of(out, run.state.now, time, end, len(which) > 0 and self._flies(run, which))
-        for label in np.unique(self.label[members]).tolist():
-            mine = members[self.label[members] == label]
+        energies_of_islands(run.state.now, run.world.constants, members, self.label, self._energy)
+        of_island = self.label[out.members]
+        for label in np.unique(of_island).tolist():
+            taken, raised, given = out.energies[:, of_island == label].sum(axis=1).tolist()
+            part = None if way is None else part_of(way, members[self.label[members] == label])
             self._ends[label] = end
-            energy = mechanical_energy(run.state.now, run.world.constants, mine)
-            taken, raised, given = amounts[:, mine].sum(axis=1).tolist()
-            part = None if way is None else part_of(way, mine)
-            self._began[label] = _Began(time, end, mine, energy, taken, raised, given, which, part)
+            self._began[label] = _Began(time, end, float(self._energy[label]), taken, raised, given, which, part)
         return out
 
     def _flies(self, run: Run, which: np.ndarray) -> bool:
@@ -572,7 +557,7 @@ class SubsteppedIslands:
             prepare_kernels(self._world, with_events=False, with_substepped=True)
             self._joint_stepper = JointedStepper(run, self.stepper)
         return self._joint_stepper.step(
-            run, members, span, lambda fineness: self._set_up(run, members, span[0], span[1] - span[0], kept, fineness)
+            run, members, span, lambda fineness: self._load(run, members, span[0], span[1] - span[0], kept, fineness)
         )
 
     def _take_in(self, run: Run, fresh: np.ndarray, time: float) -> None:
@@ -614,21 +599,21 @@ class SubsteppedIslands:
         speed = np.linalg.norm(run.state.now.velocity[island.members], axis=1)
         return slowest[island.members] > LEAVING * speed
 
-    def _set_up(
+    def _load(
         self, run: Run, members: np.ndarray, time: float, ahead: float, kept: float, fineness: Fineness | None = None
     ) -> None:
-        """Put members, in their order, and bodies near them that stand still before the solver; kept, fineness: see `ContactStepper`."""
+        """Put members, in their order, and bodies near them that stand still before the solver; kept, fineness: see `stepper.load`."""
         world, order = run.world, self.stepper.order
         marked = np.zeros(world.num_bodies, bool)
         marked[members] = True
         members = order[marked[order]]
         fixed = np.flatnonzero(~world.dynamic | self.asleep)
-        moving = fixed[world.moving[fixed]]
-        bring_all(
-            run.state.trajectory, moving, time, run.state.now, run.state.rotation, run.acceleration,
-            run.angular_acceleration,
-        )  # fmt: skip
-        self.stepper.set_up(run, members, fixed, ahead, kept, fineness)
+        if len(moving := fixed[world.moving[fixed]]):
+            bring_all(
+                run.state.trajectory, moving, time, run.state.now, run.state.rotation, run.acceleration,
+                run.angular_acceleration,
+            )  # fmt: skip
+        self.stepper.load(run, members, fixed, ahead, kept, fineness)
 
     def begin_trajectories(self, run: Run, pair_events: PairEvents) -> None:
         """Give the members the trajectories that the solver found."""

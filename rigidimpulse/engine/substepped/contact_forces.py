@@ -18,9 +18,6 @@ from rigidimpulse.collision.contact_cache import (
     classify,
     find_contacts,
     make_workspace,
-    most_approach,
-    most_motion,
-    note_changes,
     share_of,
 )
 from rigidimpulse.collision.contact_records import MEMBER, OUTSIDE, ROUND_A, ROUND_B, SKELETON_A, SKELETON_B, SUPPORT
@@ -41,19 +38,27 @@ from rigidimpulse.core.simd import ROW, aligned
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.workers import empty_work_queue
 from rigidimpulse.dynamics.impact.restitution import LAWS
-from rigidimpulse.dynamics.solvers.tgs_soft.bodies import SolverBodies, load_bodies
-from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import note_pressed
+from rigidimpulse.dynamics.solvers.tgs_soft.bodies import SolverBodies
 from rigidimpulse.dynamics.solvers.tgs_soft.depenetration import move_apart
 from rigidimpulse.dynamics.solvers.tgs_soft.energy_balance import (
     Weights,
     begin_balance,
-    end_balance,
     make_balance,
     pay_for_rise,
 )
 from rigidimpulse.dynamics.solvers.tgs_soft.records import POINTS, Batches, empty_patches, more_batches, more_patches
 from rigidimpulse.dynamics.solvers.tgs_soft.solver import FREQUENCY, softness
 from rigidimpulse.engine.run import Run
+from rigidimpulse.engine.substepped.island_step import (
+    DEMANDS,
+    GIVEN,
+    RAISED,
+    TAKEN,
+    Surroundings,
+    load_island,
+    unload_island,
+    unload_pressed,
+)
 from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.stages import (
     ASK,
@@ -92,11 +97,11 @@ from rigidimpulse.engine.substepped.stages import (
     go_on,
     go_on_with_polyhedra,
     limits_of,
-    pieces_of,
     work_on,
 )
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.evaluate import refresh_pose
+from rigidimpulse.motion.trajectory import FIXED
 from rigidimpulse.motion.waypoints import Waypoints, grown_waypoints, make_waypoints, waypoints_of
 
 COLUMN = 20.0
@@ -147,19 +152,33 @@ at once, as finely, it gains up to 1e-2 of a domino's from what hits it in the m
 class Outcome:
     """Result of a step: bodies (k,) of the scene in the solver's order, and their poses and velocities (k, 6) at its end.
 
-    taken, raised: (k,) J that the balance of energy took off their speeds, and that they gained and could not pay.
-    given: (k,) J, work of drives and moving supports in islands with joints.
-    waypoints: of these bodies, if frames fall into the step.
+    rank: (k,) of the bodies. waypoints: of these bodies, if frames fall into the step.
+    energies: (3, k) J. taken, raised: what the balance of energy took off their speeds, and what they gained and could not pay.
+    given: work of drives and moving supports in islands with joints.
     """
 
     members: np.ndarray
+    rank: np.ndarray
     position: np.ndarray
     orientation: np.ndarray
     velocity: np.ndarray
-    taken: np.ndarray
-    raised: np.ndarray
-    given: np.ndarray
+    energies: np.ndarray
     waypoints: Waypoints | None
+
+    @property
+    def places(self) -> tuple[np.ndarray, ...]:
+        """Ranks, and what is written for them."""
+        return self.rank, self.position, self.orientation, self.velocity, self.energies
+
+    @property
+    def taken(self) -> np.ndarray:
+        """(k,) J."""
+        return self.energies[TAKEN]
+
+    @property
+    def raised(self) -> np.ndarray:
+        """(k,) J."""
+        return self.energies[RAISED]
 
 
 @dataclass(frozen=True)
@@ -252,6 +271,8 @@ class ContactStepper:
         self.pressed = np.zeros(n, bool)
         self._places, self._margins = np.zeros(0, np.int64), np.zeros(0)
         self.members, self._progress = np.zeros(0, np.int64), np.zeros(COLUMNS, np.int64)
+        self._around = Surroundings(bounds, self.fat_boxes.fat, world.inv_mass, world.steady_strength, self._part)
+        self._demands = np.zeros(DEMANDS)
         self._island = Island(
             self._convex, self.bodies, self.balance, self._weights, self.order, self._cornered, world.coefficients
         )
@@ -287,62 +308,68 @@ class ContactStepper:
         )  # fmt: skip
 
     def sub_step(self, members: np.ndarray) -> float:
+        """Length of a sub-step of members, s, see `_sub_step`."""
+        return self._sub_step(float(self.world.steady_strength[members].max()), float(self.skin[members].min()))
+
+    def _sub_step(self, strength: float, skin: float) -> float:
         """Length of a sub-step, s: short enough for the load of a column, so that it scales with the size of bodies."""
-        strength = float(self.world.steady_strength[members].max())
         step, pieces = self.world.accuracy.step, self._least_sub_steps
         if strength > 0.0:
             # The load of k bodies presses the skin in by k g / w^2, w = 2 pi F / h.
-            h = 2.0 * math.pi * FREQUENCY * math.sqrt(PRESSED * float(self.skin[members].min()) / (COLUMN * strength))
+            h = 2.0 * math.pi * FREQUENCY * math.sqrt(PRESSED * skin / (COLUMN * strength))
             pieces = max(math.ceil(step / h), pieces)
         return step / pieces
-
-    def _unlike(self) -> float:
-        """How many times as many sub-steps bodies of unlike masses ask for that touch each other."""
-        pairs, mass = self.table.pairs, self._weights.mass
-        inside = (pairs.count > 0) & (self._part[self.order[pairs.first]] == MEMBER) & (self._part[self.order[pairs.second]] == MEMBER)
-        a, b = mass[pairs.first[inside]], mass[pairs.second[inside]]
-        ratio = float((np.maximum(a, b) / np.minimum(a, b)).max(initial=1.0))
-        return math.sqrt(max(min(ratio, MOST_UNLIKE) / UNLIKE, 1.0))
 
     def span(self, members: np.ndarray, step: float) -> float:
         """Longest time of a step [s] that members are stepped at once, s: bodies may fall by half an inner radius in it."""
         strength = float(self.world.steady_strength[members].max())
         return min(step, SPAN * math.sqrt(float(self.inner[members].min()) / strength)) if strength > 0.0 else step
 
-    def find_pairs(self, run: Run, members: np.ndarray, others: np.ndarray, ahead: float) -> None:
-        """See that the pairs hold all that members may meet in `ahead` s, among themselves and of the others."""
-        found = self.fat_boxes.renewed(run.state.now, run.acceleration, members, others, ahead)
-        if found is not None:
-            self.table.replace(*found)
-            classify(self.table.pairs, self.bodies, self.shapes)
+    def _renew_pairs(self, run: Run, ahead: float) -> None:
+        """Find the pairs anew that bodies which take part may meet in `ahead` s, among themselves and of those that stand."""
+        self.table.replace(*self.fat_boxes.renewed(run.state.now, run.acceleration, self._part, ahead))
+        classify(self.table.pairs, self.bodies, self.shapes)
 
-    def near(self, run: Run, member: np.ndarray, other: np.ndarray, ahead: float) -> np.ndarray:
-        """Pairs (3, k) of members with each other and with others, (n,) bool each, that may meet in `ahead` s, see `FatBoxes.near`."""
-        return self.fat_boxes.near(self.table.pairs, run.state.now, run.acceleration, member, other, ahead)
+    def near(self, run: Run, member: np.ndarray, ahead: float) -> np.ndarray:
+        """Pairs (3, k) of members (n,) bool with each other and with what stands, that may meet in `ahead` s, see `FatBoxes.near`."""
+        part = self._part
+        part[:] = SUPPORT
+        # Movable bodies under way that are no members are swept.
+        part[self.world.dynamic & (run.state.trajectory.mode != FIXED)] = OUTSIDE
+        part[member] = MEMBER
+        while (near := self.fat_boxes.near(self.table.pairs, run.state.now, run.acceleration, part, ahead)) is None:
+            self._renew_pairs(run, ahead)
+        return near
 
-    def set_up(
+    def set_up(self, run: Run, members: np.ndarray, supports: np.ndarray, ahead: float) -> None:
+        """Put members and what they may touch before the kernels, and find their contacts; see `load`."""
+        self.load(run, members, supports, ahead)
+        self.look(run)
+
+    def look(self, run: Run) -> None:
+        """Find the contacts of what was loaded."""
+        self._go_on(run, PLAN)
+
+    def load(
         self, run: Run, members: np.ndarray, supports: np.ndarray, ahead: float, kept: float = 0.0, fineness: Fineness | None = None
     ) -> None:
-        """Put members and what they may touch before the kernels at the present instant, with their contacts.
+        """Put members and what they may touch before the kernels at the present instant, for a step of `ahead` s.
 
         kept: see `review`; fineness: None for that of bodies without joints.
         """
-        self.find_pairs(run, members, supports, ahead)
+        self.members, part, demands = members, self._part, self._demands
+        part[:] = OUTSIDE
+        part[supports], part[members] = SUPPORT, MEMBER
+        while not load_island(self._island, self.table.pairs, self._around, run.motion, ahead, demands):
+            self._renew_pairs(run, ahead)
         self.table.pack()
-        self.members = members
-        self._part[:] = OUTSIDE
-        self._part[supports], self._part[members] = SUPPORT, MEMBER
+        strength, skin, ratio, motion, pieces, approach = demands.tolist()
         has_joints = fineness is not None
-        fineness = fineness or Fineness(self.sub_step(members) / self._unlike(), self.motion, self._motion_of_new)
-        load_bodies(self.bodies, self.order, run.state.now, run.acceleration, self.world.inv_mass, self._part)
-        pairs, strength = self.table.pairs, float(self.world.steady_strength[members].max(initial=0.0))
-        fall = 0.5 * ahead * strength
-        note_changes(self.bodies, pairs, ahead, fall, self.world.coefficients)
-        motion = most_motion(self.bodies, pairs, ahead)
+        unlike = math.sqrt(max(min(ratio, MOST_UNLIKE) / UNLIKE, 1.0))
+        fineness = fineness or Fineness(self._sub_step(strength, skin) / unlike, self.motion, self._motion_of_new)
         # Fast bodies are looked at more often, with enough sub-steps between the looks. So are those that come from farther than
         # contacts are looked for: a big ball met small bricks only when it was a third inside of them (issue 28).
-        pieces = pieces_of(self.bodies, pairs, self._cornered, motion, ahead)
-        needed = math.ceil(max(pieces, most_approach(self.bodies, pairs, ahead, fall)))
+        needed = math.ceil(max(pieces, approach))
         if needed > MOST_LOOKS:
             self._report_fastest(run, members, needed, ahead)
             needed = MOST_LOOKS
@@ -351,19 +378,18 @@ class ContactStepper:
         # with joints always are, and the work of their drives counts for the whole of it.
         pieces_at_once = 1 if has_joints else math.ceil(ahead / self.step_length - 1e-9)
         parts = min(max(math.ceil(motion / fineness.motion), needed, pieces_at_once, 1), max(sub_steps // LEAST_SUB_STEPS_BETWEEN, 1))
-        part, h = ahead / parts, ahead / sub_steps
+        one, h = ahead / parts, ahead / sub_steps
         self._step = self._step._replace(
-            h=h, ahead=part, first_kept=kept, motion=fineness.motion_of_new, fall=0.5 * part * strength, strength=strength,
+            h=h, ahead=one, first_kept=kept, motion=fineness.motion_of_new, fall=0.5 * one * strength, strength=strength,
             soft=softness(h, fineness.sub_step), sub_steps=sub_steps, parts=parts, all_quick=self._all_quick,
             balances=pieces_at_once > 1,
         )  # fmt: skip
-        capacity = share_of(len(pairs.first), self._shares, self._shares)
+        capacity = share_of.py_func(len(self.table.pairs.first), self._shares, self._shares)
         if capacity > len(self._places):
             self._places, self._margins = reserve((2 * capacity,), np.int64), reserve((2 * capacity,), np.float64)
         looked_at = self._progress[LOOKED_AT]
         self._progress[:] = 0
         self._progress[[STAGE, LENGTH, LEFT, LOOKED_AT]] = FIND, sub_steps // parts, sub_steps // parts, looked_at
-        self._go_on(run, PLAN)
 
     @property
     def sub_step_length(self) -> float:
@@ -582,14 +608,15 @@ class ContactStepper:
         velocity = bodies.velocity.reshape(-1, ROW)[self.rank[self.members]]
         now.velocity[self.members], now.angular_velocity[self.members] = velocity[:, :3], velocity[:, 3:6]
         refresh_pose(fresh, now, run.state.rotation, self.world.inertia)
+        begin_balance(self.balance, bodies, self._weights)
 
     def step(self, run: Run, begin: float, end: float) -> Outcome:
-        """Step what `set_up` put before the kernels from `begin` to `end`, s."""
+        """Step what was loaded from `begin` to `end`, s."""
         has_frames = self.begin_step(run, begin, end)
         self._go_on(run, END)
-        note_pressed(self.bodies, self.order, self.pressed)
-        out = self.end_step(self._waypoints if has_frames else None)
-        out.given[:] = 0.0
+        out = self._outcome(self._waypoints if has_frames else None)
+        unload_pressed(self._island, *out.places, self.pressed)
+        out.energies[GIVEN] = 0.0
         return out
 
     def step_by(self, run: Run, solve: Callable[[int, float], None]) -> None:
@@ -603,24 +630,23 @@ class ContactStepper:
             self._go_on(run, LIST)
 
     def begin_step(self, run: Run, begin: float, end: float) -> bool:
-        """Remember the energies of the members; returns whether frames fall between `begin` and `end`, s."""
+        """Whether frames fall between `begin` and `end`, s, in the step of what was loaded."""
         has_frames = run.recorder.has_frames(begin, end)
         self._step = self._step._replace(has_frames=has_frames)
         self._waypoints.number[0] = 0
-        begin_balance(self.balance, self.bodies, self._weights)
         return has_frames
 
     def end_step(self, waypoints: Waypoints | None) -> Outcome:
         """Balance the energy, and say where the members are; waypoints: of all bodies, by rank."""
-        bodies, balance, members, at = self.bodies, self.balance, self.members, self.rank[self.members]
-        # Sub-steps must not make energy beyond what moving supports and drives gave.
-        given = balance.given[at]
-        end_balance(balance, bodies, self._weights)
-        velocity = bodies.velocity.reshape(-1, ROW)[at, :6]
+        out = self._outcome(waypoints)
+        unload_island(self._island, *out.places)
+        return out
+
+    def _outcome(self, waypoints: Waypoints | None) -> Outcome:
+        """Space for where the members are; waypoints: of all bodies, by rank."""
+        at, k = self.rank[self.members], len(self.members)
         own = None if waypoints is None else waypoints_of(waypoints, at)
-        return Outcome(
-            members, bodies.position[at], bodies.orientation[at], velocity, balance.taken[at], balance.raised[at], given, own
-        )  # fmt: skip
+        return Outcome(self.members, at, np.empty((k, 3)), np.empty((k, 4)), np.empty((k, 6)), np.empty((3, k)), own)
 
 
 def _special_lists(patches: int) -> tuple[np.ndarray, np.ndarray]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rigidimpulse.core.kernels import jit
+from rigidimpulse.core.kernels import inlined, jit
 from rigidimpulse.core.quaternion import product, quaternion_to_matrix
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.motion.trajectory import FREE, LENGTH, LINEAR, SPEEDS, begin, begin_straight, stepped_at
@@ -52,17 +52,21 @@ def let_fly(trajectory, members, steady):
         begin(trajectory, i)
 
 
+@inlined
+def is_slow(bodies, i, inner, limits):
+    """Whether body i moves no farther than limits[0] 1/s of its inner radius, m, and spins no faster than limits[1] rad/s."""
+    speed, spin = 0.0, 0.0
+    for c in range(3):
+        speed += bodies.velocity[i, c] ** 2
+        spin += bodies.angular_velocity[i, c] ** 2
+    return np.sqrt(speed) <= limits[0] * inner and np.sqrt(spin) <= limits[1]
+
+
 @jit
-def mark_slow(bodies, inner, farthest, fastest, member):
-    """Unmark members (n,) that move farther than `farthest` 1/s of their inner radius, or spin faster than `fastest` rad/s."""
+def mark_slow(bodies, inner, limits, member):
+    """Unmark members (n,) that are not slow; limits: see `is_slow`."""
     for i in range(member.shape[0]):
-        if not member[i]:
-            continue
-        speed, spin = 0.0, 0.0
-        for c in range(3):
-            speed += bodies.velocity[i, c] ** 2
-            spin += bodies.angular_velocity[i, c] ** 2
-        member[i] = np.sqrt(speed) <= farthest * inner[i] and np.sqrt(spin) <= fastest
+        member[i] = member[i] and is_slow(bodies, i, inner[i], limits)
 
 
 @jit
