@@ -231,7 +231,7 @@ def _stand_beside_sub_steps(run: Run) -> None:
     connect_members(near, links, member, root, ~member)
     settle_islands(state.now, candidates, near, links, member, root, ~member, 1.0)
     CheapestRegime(~member).refusals(root, label, ~member, member, none)
-    energies_of_islands(state.now, world.constants, members, label, none)
+    energies_of_islands(state.now, world.constants, members, label, np.zeros((3, 1)), np.zeros((4, world.num_bodies)))
     refusals(world, Judged(root, member, ~member, member, member, none), (near[0], near[1]), True)
     support_levels(stepper.bodies, stepper.table.pairs, stepper.table.points, TALL)
     poses, now = (np.zeros((1, 3)), np.zeros((1, 4)), np.zeros((1, 6))), state.now

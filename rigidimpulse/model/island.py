@@ -92,10 +92,14 @@ def empty_contacts(m: int) -> Contacts:
     return Contacts(*np.empty((2, m), np.int64), *np.empty((3, m, 3)), *np.empty((5, m)))
 
 
+_NONE, _NO_CONTACTS = np.zeros(0, np.int64), empty_contacts(0)
+_NO_TOUCHING = Touching(_NONE, np.zeros((0, 2), np.int64))
+_NO_SPEEDS, _NO_GAPS, _NOT_LIVE = np.zeros((2, 0)), np.zeros(0), np.zeros(0, bool)
+
+
 def island_without_contacts(time: float, members: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray) -> Island:
     """Bodies that touch nothing: what only forces hold, or what only the sub-stepped regime knows the contacts of."""
-    none = np.zeros(0, np.int64)
     return Island(
-        time=time, members=members, contacts=empty_contacts(0), place=none, touching=Touching(none, np.zeros((0, 2), np.int64)),
-        contact_margin=np.zeros(0), speeds=np.zeros((2, 0)), live=np.zeros(0, bool), velocity=velocity, angular_velocity=angular_velocity,
+        time=time, members=members, contacts=_NO_CONTACTS, place=_NONE, touching=_NO_TOUCHING, contact_margin=_NO_GAPS, speeds=_NO_SPEEDS,
+        live=_NOT_LIVE, velocity=velocity, angular_velocity=angular_velocity,
     )  # fmt: skip

@@ -119,7 +119,7 @@ class SubsteppedIslands:
         self.label = np.full(world.num_bodies, -1, np.int64)
         self.sleep_timer = np.zeros(world.num_bodies)
         self.asleep = np.zeros(world.num_bodies, bool)
-        self._energy = np.zeros(world.num_bodies)
+        self._energies = np.zeros((4, world.num_bodies))
         self._root, self._touches = np.zeros(world.num_bodies, np.int64), np.zeros(world.num_bodies, bool)
         self._stood = np.full((world.num_bodies, 7), np.inf)
         self._taken = np.zeros(world.num_bodies, bool)
@@ -339,7 +339,7 @@ class SubsteppedIslands:
         if not len(members):
             return
         state, world = run.state, run.world
-        labels = np.unique(self.label[members]).tolist()
+        labels = sorted(set(self.label[members].tolist()))
         for label in labels:
             if label in self._began and (way := self._began[label].way) is not None:
                 write_frames(run.recorder, way, time, Flown(world.inertia[way.bodies], world.steady_acceleration[way.bodies]))
@@ -348,10 +348,10 @@ class SubsteppedIslands:
             state.trajectory, members, time, world.steady_acceleration, state.now, state.rotation, run.acceleration,
             run.angular_acceleration,
         )  # fmt: skip
-        energies_of_islands(state.now, world.constants, members, self.label, self._energy)
+        energies_of_islands(state.now, world.constants, members, self.label, np.zeros((3, len(members))), self._energies)
         for label in labels:
             if label in self._began:
-                self._account(run, self._began.pop(label), float(self._energy[label]), time)
+                self._account(run, self._began.pop(label), float(self._energies[0, label]), time)
 
     def _account(self, run: Run, began: _Began, energy: float, time: float) -> None:
         """Account for a step that ends at `time` with an energy, J."""
@@ -385,10 +385,10 @@ class SubsteppedIslands:
             exact = bool(np.all(self.label[island.members] < 0))
             if exact and self.hand_over.runs_away(island) and self.hand_over.hands_over(run, pair_events, island):
                 self.label[island.members] = island.members.min()
-        lost = self.hand_over.lost(pair_events, islands, self.label < 0)
-        # One sub-stepped island from here on.
-        self.label[lost] = lost.min(initial=len(self.label))
-        pair_events.inside[lost] = True
+        if len(lost := self.hand_over.lost(pair_events, islands, self.label < 0)):
+            # One sub-stepped island from here on.
+            self.label[lost] = lost.min()
+            pair_events.inside[lost] = True
         first = not pair_events.substepped_begun
         pair_events.substepped_begun = True
         hit = [island for island in islands if np.any(self.label[island.members] >= 0)]
@@ -398,8 +398,10 @@ class SubsteppedIslands:
             self._bring_in(run, bare, members)
             return [*islands, bare]
         # An island that is hit is stepped again, with all of its members; what else is due comes with the first, once.
+        if not hit:
+            return islands
         stepped = [np.flatnonzero(np.isin(self.label, self._labels_of(island.members))) for island in hit]
-        rest = np.setdiff1d(members, np.concatenate(stepped)) if hit else members
+        rest = np.setdiff1d(members, np.concatenate(stepped))
         for island, own in zip(hit, stepped, strict=True):
             self._bring_in(run, island, np.union1d(own, rest))
             rest = rest[:0]
@@ -420,7 +422,8 @@ class SubsteppedIslands:
         state, time = run.state, island.time
         stepped = state.trajectory.mode[members] == LINEAR
         self._end_trajectories(run, members[stepped & (state.trajectory.start[members] < time)], time)
-        if len(away := np.setdiff1d(members[~(stepped | self.asleep[members])], island.members)):
+        away = members[~(stepped | self.asleep[members])]
+        if len(away) and len(away := np.setdiff1d(away, island.members)):
             bring_all(state.trajectory, away, time, state.now, state.rotation, run.acceleration, run.angular_acceleration)
             run.acceleration[away] = run.world.steady_acceleration[away]
         island.substepped = members
@@ -534,14 +537,15 @@ class SubsteppedIslands:
             self.hand_over.cheapest.note(members, self.stepper.parts)
         if out is None:
             return None
-        way = way_of(out, run.state.now, time, end, len(which) > 0 and self._flies(run, which))
-        energies_of_islands(run.state.now, run.world.constants, members, self.label, self._energy)
-        of_island = self.label[out.members]
-        for label in np.unique(of_island).tolist():
-            taken, raised, given = out.energies[:, of_island == label].sum(axis=1).tolist()
+        way = None
+        if out.waypoints is not None:
+            way = way_of(out, out.waypoints, run.state.now, (time, end), len(which) > 0 and self._flies(run, which))
+        energies_of_islands(run.state.now, run.world.constants, out.members, self.label, out.energies, self._energies)
+        for label in sorted(set(self.label[members].tolist())):
             part = None if way is None else part_of(way, members[self.label[members] == label])
             self._ends[label] = end
-            self._began[label] = _Began(time, end, float(self._energy[label]), taken, raised, given, which, part)
+            energy, taken, raised, given = self._energies[:, label].tolist()
+            self._began[label] = _Began(time, end, energy, taken, raised, given, which, part)
         return out
 
     def _flies(self, run: Run, which: np.ndarray) -> bool:

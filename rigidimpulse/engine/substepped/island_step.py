@@ -14,7 +14,7 @@ from rigidimpulse.collision.contact_cache import most_approach, most_motion, not
 from rigidimpulse.collision.contact_records import MEMBER
 from rigidimpulse.collision.fat_boxes import BodyBounds, Fat, stay_in_boxes
 from rigidimpulse.core.kernels import jit
-from rigidimpulse.dynamics.energy import mechanical_energy
+from rigidimpulse.dynamics.energy import add_kinetic, kinetic_energy, mechanical_energy
 from rigidimpulse.dynamics.solvers.tgs_soft.bodies import load_bodies
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import note_pressed
 from rigidimpulse.dynamics.solvers.tgs_soft.energy_balance import begin_balance, end_balance
@@ -102,10 +102,37 @@ def unload_pressed(island, at, position, orientation, velocity, energies, presse
 
 
 @jit
-def energies_of_islands(now, constants, members, label, out):
-    """Write the mechanical energy (n,) J of the members (k,) of each island, by its label; label: (n,) of each body, or -1."""
-    for i in range(out.shape[0]):
-        out[i] = 0.0
+def energies_of_islands(now, constants, members, label, energies, out):
+    """Write the mechanical energy of the members (k,) of each island, and the sums of their `energies` (3, k), to out (4, n), by its label.
+
+    label: (n,) of each body, or -1. All in J.
+    """
+    for i in range(out.shape[1]):
+        for row in range(4):
+            out[row, i] = 0.0
     for k in range(members.shape[0]):
-        if label[members[k]] >= 0:
-            out[label[members[k]]] += mechanical_energy(now, constants, members[k : k + 1])
+        i = label[members[k]]
+        if i >= 0:
+            out[0, i] += mechanical_energy(now, constants, members[k : k + 1])
+            for row in range(3):
+                out[1 + row, i] += energies[row, k]
+
+
+@jit
+def compare_energies(now, constants, members, reached, out):
+    """Write the mechanical energies of the members (k,) now and as they were reached, and their kinetic energies, to out (4,), J.
+
+    reached: positions (k, 3), orientations (k, 4) and velocities (k, 6).
+    """
+    position, orientation, velocity = reached
+    for c in range(4):
+        out[c] = 0.0
+    for k in range(members.shape[0]):
+        i, one = members[k], members[k : k + 1]
+        out[0] += mechanical_energy(now, constants, one)
+        out[2] += kinetic_energy(now, constants, one)
+        moves = add_kinetic(0.0, velocity[k, :3], velocity[k, 3:], orientation[k], constants.mass[i], constants.inertia[i])
+        out[3] += moves
+        out[1] += moves
+        for c in range(3):
+            out[1] -= constants.mass[i] * constants.steady_acceleration[i, c] * position[k, c]

@@ -14,12 +14,12 @@ import numpy as np
 from rigidimpulse.core.simd import ROW
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland
-from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.dynamics.solvers.time_stepping.solver import GAP, HALVED, Kept, step_island, stop_island
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper, Fineness, Outcome
 from rigidimpulse.engine.substepped.given_impulses import log_given
-from rigidimpulse.engine.substepped.trajectories import most_stray
+from rigidimpulse.engine.substepped.island_step import compare_energies
+from rigidimpulse.engine.substepped.trajectories import stray_of
 from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.waypoints import make_waypoints
 
@@ -76,6 +76,7 @@ class JointedStepper:
         self._stiffening, self._column = np.zeros(n + 1), np.zeros(n + 1, np.int64)
         self._driven, self.halved = np.zeros(n + 1, bool), 0
         self._allowed, self._open = CLOSED * world.joint_size, OPEN * world.joint_size
+        self._near, self._energies = np.zeros(n, bool), np.zeros(4)
         self._waypoints, self._no_waypoints = make_waypoints(MOST_WAYPOINTS, n), make_waypoints(0, n)
 
     def step(self, run: Run, members: np.ndarray, span: tuple[float, float], set_up: Callable[[Fineness], None]) -> Outcome | None:
@@ -85,25 +86,24 @@ class JointedStepper:
         of it taken back. Light links between heavy bodies may whip. And it is stepped once more where a hit in it has set bodies turning.
         set_up: puts the members before the solver, to be stepped so finely.
         """
-        before, stray, finer = self._stray(run.state.now, members), 0.0, iter(FINER)
+        before, stray, finer = self._stray(members, run.state.now.angular_velocity[members]), 0.0, iter(FINER)
         part = next(finer, None)
         while part is not None:
             set_up(self._fineness(max(before, stray), part))
             tried = self._try(run, *span)
             if tried is not None:
-                if stray == 0.0 and (stray := self._spun_up(run, tried.outcome)) > 0.0:
+                if stray == 0.0 and (stray := self._spun_up(tried.outcome)) > 0.0:
                     continue
                 if self._driven[self._stepper.rank[self._stepper.members]].any() or self._keeps_energy(run, tried.outcome):
                     return self._keep(run, tried, span)
             part = next(finer, None)
         return None
 
-    def _stray(self, turning: BodyState, members: np.ndarray) -> float:
-        """How often in a second sub-steps must begin for members that turn so, 1/s."""
-        stepper, pairs = self._stepper, self._stepper.table.pairs
-        near = np.zeros(len(stepper.pressed), bool)
-        near[stepper.order[pairs.first]] = near[stepper.order[pairs.second]] = True
-        return float(most_stray(turning, members, near, stepper.reach, stepper.skin, BEND * self._world.accuracy.substep_motion**2))
+    def _stray(self, members: np.ndarray, spin: np.ndarray) -> float:
+        """How often in a second sub-steps must begin for members (k,) that turn so, (k, 3) rad/s, 1/s."""
+        stepper, near = self._stepper, self._near
+        allowed = BEND * self._world.accuracy.substep_motion**2
+        return float(stray_of(members, spin, stepper.table.pairs, stepper.order, (stepper.reach, stepper.skin, allowed), near))
 
     def _fineness(self, stray: float, finer: int) -> Fineness:
         """How finely members are stepped; stray: how often sub-steps must begin, 1/s, finer: in how many parts each of them is made."""
@@ -111,11 +111,9 @@ class JointedStepper:
         pieces = min(max(stray * accuracy.step, SUB_STEPS), MOST_SUB_STEPS)
         return Fineness(accuracy.step / (pieces * finer), MOTION * accuracy.substep_motion)
 
-    def _spun_up(self, run: Run, out: Outcome) -> float:
+    def _spun_up(self, out: Outcome) -> float:
         """How often in a second sub-steps must begin for how members turn at the end, 1/s; 0 if they began about as often."""
-        turning = run.state.now._replace(angular_velocity=run.state.now.angular_velocity.copy())
-        turning.angular_velocity[out.members] = out.velocity[:, 3:]
-        stray, step = self._stray(turning, out.members), self._world.accuracy.step
+        stray, step = self._stray(out.members, out.velocity[:, 3:]), self._world.accuracy.step
         wanted = min(stray * step, MOST_SUB_STEPS)
         return stray if wanted * self._stepper.sub_step_length > SPUN_UP * step else 0.0
 
@@ -162,18 +160,14 @@ class JointedStepper:
 
         They have not kept it either where the balance had to take more than TAKEN of what moves, and that rise.
         """
-        now, constants, members = run.state.now, self._world.constants, out.members
-        after = now._replace(
-            position=now.position.copy(), orientation=now.orientation.copy(), velocity=now.velocity.copy(),
-            angular_velocity=now.angular_velocity.copy(),
-        )  # fmt: skip
-        after.position[members], after.orientation[members] = out.position, out.orientation
-        after.velocity[members], after.angular_velocity[members] = out.velocity[:, :3], out.velocity[:, 3:]
-        gained = mechanical_energy(after, constants, members) - mechanical_energy(now, constants, members) - float(out.raised.sum())
-        moves = max(kinetic_energy(now, constants, members), kinetic_energy(after, constants, members))
+        energies, constants, members = self._energies, self._world.constants, out.members
+        compare_energies(run.state.now, constants, members, (out.position, out.orientation, out.velocity), energies)
+        before, after, moved_before, moves_after = energies.tolist()
+        moves, gained = max(moved_before, moves_after), after - before - float(out.raised.sum())
         rise = float(np.sum(constants.mass[members] * constants.steady_strength[members] * self._stepper.skin[members]))
         # Comparisons with what is no number are false.
         return gained <= GAINED * moves + rise and float(out.taken.sum()) <= TAKEN * moves + rise
+
 
 def _by_rank(bodies: np.ndarray, rank: np.ndarray) -> np.ndarray:
     """Ranks of bodies (j,); the world stays -1."""

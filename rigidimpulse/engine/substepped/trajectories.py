@@ -87,6 +87,26 @@ def most_stray(bodies, members, pressed, reach, skin, allowed):
 
 
 @jit
+def stray_of(members, spin, pairs, order, straightness, near):
+    """The same of members (k,) that turn by spin (k, 3) rad/s, and may be acted on where they are in pairs, of ranks; order (n,) by rank.
+
+    straightness: reach, skin (n,) m and `allowed`, as above. near (n,) bool is scratch.
+    """
+    most, (reach, skin, allowed) = 0.0, straightness
+    for i in range(near.shape[0]):
+        near[i] = False
+    for p in range(pairs.first.shape[0]):
+        near[order[pairs.first[p]]] = near[order[pairs.second[p]]] = True
+    for k in range(members.shape[0]):
+        i, w = members[k], spin[k]
+        size = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+        most = max(most, size / TURN)
+        if near[i]:
+            most = max(most, size * np.sqrt(reach[i] / (8.0 * allowed * skin[i])))
+    return most
+
+
+@jit
 def depart(trajectory, members, time, length, bodies, position, orientation, velocity):
     """Trajectories from the present poses to the given ones (k, 3), (k, 4), where the velocities are (k, 6).
 

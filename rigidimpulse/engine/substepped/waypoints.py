@@ -24,6 +24,7 @@ from rigidimpulse.engine.substepped.contact_forces import Outcome
 from rigidimpulse.engine.substepped.trajectories import depart
 from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.trajectory import make_trajectories
+from rigidimpulse.motion.waypoints import Waypoints
 from rigidimpulse.recording.recorder import Frames, Recorder
 
 LAST = TOLERANCES.sub_stepping.last_sub_step
@@ -45,14 +46,12 @@ class Flown(NamedTuple):
     gravity: np.ndarray  # (k, 3) m/s2, with constant forces
 
 
-def way_of(outcome: Outcome, now: BodyState, begin: float, end: float, flies: bool) -> Way | None:
-    """The way of an outcome from the present state, at `begin`, to `end` [s]; None if no frames fall between.
+def way_of(outcome: Outcome, waypoints: Waypoints, now: BodyState, span: tuple[float, float], flies: bool) -> Way:
+    """The way of an outcome from the present state by waypoints, over a span [s].
 
     flies: whether it is that of an island with joints that nothing else holds.
     """
-    members, waypoints = outcome.members, outcome.waypoints
-    if waypoints is None:
-        return None
+    members, (begin, end) = outcome.members, span
     first = np.column_stack([now.position[members], now.orientation[members], now.velocity[members], now.angular_velocity[members]])
     last = np.column_stack([outcome.position, outcome.orientation, outcome.velocity])
     # The last of them is the end, before its energy was balanced.
