@@ -28,7 +28,7 @@ from rigidimpulse.collision.manifold.dispatch import HULLS, PLANE, convex_contac
 from rigidimpulse.collision.manifold.polyhedra import POINTS, Pair
 from rigidimpulse.collision.manifold.reduce import GAP_WEIGHT, PER_NORMAL, reduce_contacts
 from rigidimpulse.core.kernels import inlined, jit
-from rigidimpulse.core.vector import turned_back_by, turned_by
+from rigidimpulse.core.vector import dot, row, subtract, turned_back_by, turned_by
 
 OUT: float = 1e-3
 """How far a point is moved out, in inner radii, to see whether it is in another part."""
@@ -47,14 +47,17 @@ class PartScratch(NamedTuple):
     body: np.ndarray  # (2,) 0 and 1, of the type that numbers of bodies have in pairs: kernels are compiled for that one
     rotation: np.ndarray  # (2, 3, 3)
     velocity: np.ndarray  # (16,) v and w of each
+    place: np.ndarray  # (k, 3) m, centres of the parts of the second body from the first body, in world axes
     real: np.ndarray  # (k, 10) on a, on b, normal, gap; relative to the first body
     integer: np.ndarray  # (k, 5) parts of both bodies, kind and features
 
 
 def make_part_scratch(places: int = FIRST_PLACES) -> PartScratch:
-    """Scratch memory for one pair of bodies that has `places` contacts at most."""
+    """Scratch memory for one pair of bodies that has `places` contacts, and parts of one body, at most."""
     body = np.arange(2, dtype=np.int32)
-    return PartScratch(body, np.empty((2, 3, 3)), np.zeros(16), np.empty((places, 10)), np.zeros((places, 5), np.int64))
+    return PartScratch(
+        body, np.empty((2, 3, 3)), np.zeros(16), np.empty((places, 3)), np.empty((places, 10)), np.zeros((places, 5), np.int64)
+    )
 
 
 @inlined
@@ -95,7 +98,13 @@ def contacts_of_parts(shapes, bodies, ends, query, scratch, found):
     (a, b), (points, parts) = ends, found
     s, t, between = bodies.shape[a], bodies.shape[b], scratch.between
     away = (between[0], between[1], between[2])
-    count, least, radius = np.int64(0), inf, bodies.radius[b]
+    count, least, radius, place = np.int64(0), inf, bodies.radius[b], parts.place
+    first, last = shapes.part_first[t], shapes.part_first[t + 1]
+    if last - first > place.shape[0]:
+        return np.int64(-1), least
+    for q in range(first, last):
+        x, y, z = _place_of(shapes, bodies, q, b)
+        place[q - first, 0], place[q - first, 1], place[q - first, 2] = away[0] + x, away[1] + y, away[2] + z
     for p in range(shapes.part_first[s], shapes.part_first[s + 1]):
         mine = _place_of(shapes, bodies, p, a)
         # Whole bodies first: most parts are near none of the other.
@@ -104,16 +113,21 @@ def contacts_of_parts(shapes, bodies, ends, query, scratch, found):
             least = min(least, gap)
             continue
         _set_part(bodies, a, mine, parts, 0)
-        for q in range(shapes.part_first[t], shapes.part_first[t + 1]):
-            x, y, z = _place_of(shapes, bodies, q, b)
-            gap = _between_spheres(mine, (away[0] + x, away[1] + y, away[2] + z), shapes.bound[p] + shapes.bound[q])
+        for q in range(first, last):
+            there, reach = row(place, q - first), shapes.bound[p] + shapes.bound[q]
+            way = subtract(there, mine)
+            # Most are so far away that not even the square root is worth it.
+            square, far = dot(way, way), reach + max(query.margin, least)
+            if square > far * far:
+                continue
+            gap = sqrt(square) - reach
             if gap > query.margin:
                 least = min(least, gap)
                 continue
             if count + POINTS > parts.real.shape[0]:
                 return np.int64(-1), least
-            _set_part(bodies, b, (x, y, z), parts, 1)
-            between[0], between[1], between[2] = away[0] + x - mine[0], away[1] + y - mine[1], away[2] + z - mine[2]
+            _set_part(bodies, b, _place_of(shapes, bodies, q, b), parts, 1)
+            between[0], between[1], between[2] = way
             i, j = shapes.part[p], shapes.part[q]
             flat = is_half_space(shapes.half_space, i) or is_half_space(shapes.half_space, j)
             pair = Pair(parts.rotation, parts.velocity, parts.body[0], parts.body[1], i, j)

@@ -575,14 +575,15 @@ class ContactStepper:
 
     def report_crossed(self, run: Run, members: np.ndarray, time: float) -> None:
         """Report pairs of members, brought to the present, whose inset surfaces cross: the place of contact is not known any more."""
-        smaller, depth, n = self.smaller, self.smaller.depth, self.world.num_bodies
-        if not depth.any():
-            return
         pairs, world, now = self.table.pairs, self.world, run.state.now
         mine = np.zeros(world.num_bodies, bool)
         mine[self.rank[members]] = True
-        asked = (mine[pairs.first] | mine[pairs.second]) & (depth[pairs.first] + depth[pairs.second] > 0.0)
-        asked &= pairs.kind == GENERAL
+        asked = (mine[pairs.first] | mine[pairs.second]) & (pairs.kind == GENERAL)
+        # Smaller shapes take long to make: they are not made for this.
+        if not asked.any():
+            return
+        smaller, depth, n = self.smaller, self.smaller.depth, world.num_bodies
+        asked &= depth[pairs.first] + depth[pairs.second] > 0.0
         for i, j in zip(self.order[pairs.first[asked]].tolist(), self.order[pairs.second[asked]].tolist(), strict=True):
             a, b, limit = int(smaller.of_body[n + i]), int(smaller.of_body[n + j]), CROSSED * min(self.inner[i], self.inner[j])
             rotation = to_matrix(now.orientation[i]), to_matrix(now.orientation[j])
