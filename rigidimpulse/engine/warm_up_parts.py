@@ -42,6 +42,7 @@ from rigidimpulse.engine.exact.joints import JointState
 from rigidimpulse.engine.exact.step_size import Forces, StepLimits, Turning, estimate_error, hold_turning, turns
 from rigidimpulse.engine.exact.trajectories import set_impact_margins, take_steady_load
 from rigidimpulse.engine.islands import touching_islands
+from rigidimpulse.engine.measure.edges_in_parts import enter_with_edges, parts_of
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.regime import TALL, Judged, refusals, support_levels
 from rigidimpulse.engine.run import Run, start_trajectories
@@ -148,6 +149,7 @@ def _respond_and_detect(run: Run) -> None:
     _take_steps(run)
     points_inside(run.world.geometry, 1, np.zeros((1, 3)))
     crossings(run.world.geometry, 1, np.zeros((1, 3)), np.ones((1, 3)))
+    enter_with_edges(parts_of([], []), np.zeros((1, 2, 3)), np.eye(3)[None], np.zeros((1, 3)), np.zeros(1))
 
 
 def _held(run: Run, contacts: Contacts) -> tuple[ContactProblem, Turning]:

@@ -197,21 +197,32 @@ def _is_covered(shapes, bodies, own, x, n, size):
 def _is_in_part(shapes, ends, d, way, near):
     """Whether d (3,), from the centre of part ends[0], is in it; it is on part ends[1] that looks along `way`; near: IN, m."""
     p, q = ends
-    j, is_inside = shapes.part[p], True
+    j = shapes.part[p]
+    # Most points are in front of some face: how far the other part reaches is asked of the few that are not.
     for f in range(shapes.face_first[j], shapes.face_first[j + 1]):
-        plane = shapes.plane[f]
-        above = plane[0] * d[0] + plane[1] * d[1] + plane[2] * d[2] - plane[3]
-        if above > near:
+        above = _above(shapes, f, d)
+        if above > near or (above > 0.0 and _along(shapes, f, way) > ALONG):
             return False
-        along = plane[0] * way[0] + plane[1] * way[1] + plane[2] * way[2]
-        if along > ALONG:
-            is_inside = is_inside and above <= 0.0
-        elif along > -ALONG and above > -near:
-            apart = 0.0
+    for f in range(shapes.face_first[j], shapes.face_first[j + 1]):
+        if _above(shapes, f, d) > -near and -ALONG < _along(shapes, f, way) <= ALONG:
+            plane, apart = shapes.plane[f], 0.0
             for k in range(3):
                 apart += plane[k] * (shapes.centre[q, k] - shapes.centre[p, k])
-            is_inside = is_inside and apart + _reach(shapes, shapes.part[q], plane) <= plane[3] + near
-    return is_inside
+            if apart + _reach(shapes, shapes.part[q], plane) > plane[3] + near:
+                return False
+    return True
+
+
+@inlined
+def _along(shapes, f, way):
+    """Cosine of the normal of face f and `way` (3,)."""
+    return shapes.plane[f, 0] * way[0] + shapes.plane[f, 1] * way[1] + shapes.plane[f, 2] * way[2]
+
+
+@inlined
+def _above(shapes, f, d):
+    """Height of d (3,) above face f, m."""
+    return _along(shapes, f, d) - shapes.plane[f, 3]
 
 
 @inlined

@@ -26,6 +26,7 @@ import numpy as np
 from rigidimpulse.collision.containment import points_inside
 from rigidimpulse.collision.geometry import CYLINDER, HALF_SPACE, CompiledShape, Geometry, Primitive, build_geometry
 from rigidimpulse.core.kept import kept_with_argument
+from rigidimpulse.engine.measure.edges_in_parts import Parts, enter_with_edges, parts_of
 
 MOST_EDGES: int = 96
 """Edges of a primitive that are looked at, evenly chosen of all; all corners of those with fewer count."""
@@ -78,7 +79,7 @@ class Solid:
     """What may be entered, in the shape's frame."""
 
     convex: list[np.ndarray]  # (m, 4) outward normals and offsets
-    boxes: list[np.ndarray]  # (2, 3) m, lowest and highest corner of each of these
+    parts: Parts  # the same together
     rounded: list[tuple[np.ndarray, np.ndarray, float]]  # ends (3,) of a segment, and its radius, m
     cylinders: list[Primitive]
     hollow: list[Primitive]  # surfaces that are not convex, or open
@@ -130,11 +131,11 @@ def probe_of(shape: CompiledShape) -> Probe:
 @kept_with_argument
 def solid_of(shape: CompiledShape) -> Solid:
     """What of a shape may be entered; open surfaces may not, and others only as part of a `whole_solid`."""
-    solid = Solid([], [], [], [], [], np.zeros((0, 3, 3)), np.zeros((4, 0)), None, _bounds(shape))
+    solid, boxes = Solid([], parts_of([], []), [], [], [], np.zeros((0, 3, 3)), np.zeros((4, 0)), None, _bounds(shape)), []
     for primitive, faces in zip(shape.primitives, _planes_of(shape), strict=True):
         if primitive.kind == HALF_SPACE:
             solid.convex.append(primitive.frame[None, :4])
-            solid.boxes.append(np.array([[-np.inf], [np.inf]]) * np.ones(3))
+            boxes.append(np.array([[-np.inf], [np.inf]]) * np.ones(3))
         elif primitive.kind == CYLINDER:
             solid.cylinders.append(primitive)
         elif not len(primitive.faces):
@@ -143,7 +144,8 @@ def solid_of(shape: CompiledShape) -> Solid:
             solid.hollow.append(primitive)
         else:
             solid.convex.append(faces)
-            solid.boxes.append(np.array([primitive.vertices.min(axis=0), primitive.vertices.max(axis=0)]))
+            boxes.append(np.array([primitive.vertices.min(axis=0), primitive.vertices.max(axis=0)]))
+    solid = replace(solid, parts=parts_of(solid.convex, boxes))
     if len(shape.primitives) == 1 and solid.convex and len(solid.convex[0]) <= MOST_BOUNDS:
         return replace(solid, bounds=np.vstack([solid.bounds, solid.convex[0]]))
     return solid
@@ -174,11 +176,14 @@ def surely_apart(corners: np.ndarray, bounds: np.ndarray, posed: Posed) -> np.nd
 def depth_in(solid: Solid, probe: Probe, posed: Posed) -> np.ndarray:
     """Depth (c,) m by which probes at c poses in the frame of a solid are inside it; 0 where nothing is known to be."""
     depth = np.zeros(len(posed.translation))
-    centres, edges = posed.points(probe.centres), posed.points(probe.edges)
-    if solid.convex:
-        _enter_convex(solid, probe, centres, edges, depth)
+    centres = posed.points(probe.centres)
+    for planes in solid.convex if len(probe.centres) else []:
+        np.maximum(depth, _balls_in_planes(planes, centres, probe.radii), out=depth)
+    if solid.convex and len(probe.edges):
+        enter_with_edges(solid.parts, probe.edges, *map(np.ascontiguousarray, (posed.rotation, posed.translation)), depth)
     if not (solid.rounded or solid.cylinders or solid.inside):
         return depth
+    edges = posed.points(probe.edges)
     points = np.concatenate([centres, *(edges[:, :, 0] + s * (edges[:, :, 1] - edges[:, :, 0]) for s in ALONG)], axis=1)
     radii = np.concatenate([probe.radii, np.zeros(points.shape[1] - len(probe.radii))])
     for first, last, radius in solid.rounded:
@@ -191,29 +196,6 @@ def depth_in(solid: Solid, probe: Probe, posed: Posed) -> np.ndarray:
     if solid.inside is not None:
         np.maximum(depth, _depth_in_surface(solid, points, radii), out=depth)
     return depth
-
-
-def _enter_convex(solid: Solid, probe: Probe, centres: np.ndarray, edges: np.ndarray, depth: np.ndarray) -> None:
-    """Raise depths (c,) to those in the convex parts of a solid; centres (c, k, 3) and edges (c, e, 2, 3): of the probe at its poses."""
-    lowest, highest = np.minimum(edges[:, :, 0], edges[:, :, 1]), np.maximum(edges[:, :, 0], edges[:, :, 1])
-    # Of bodies of many parts few edges are near another body, and fewer near one part: all with all took most of the time of a run.
-    whole = np.stack([np.min([box[0] for box in solid.boxes], axis=0), np.max([box[1] for box in solid.boxes], axis=0)])
-    pose, edge = np.nonzero(_meet(lowest, highest, whole))
-    edges, lowest, highest = edges[pose, edge], lowest[pose, edge], highest[pose, edge]
-    for planes, box in zip(solid.convex, solid.boxes, strict=True):
-        if len(probe.centres):
-            np.maximum(depth, _balls_in_planes(planes, centres, probe.radii), out=depth)
-        near = np.flatnonzero(_meet(lowest, highest, box))
-        if len(near):
-            np.maximum.at(depth, pose[near], _edges_in_planes(planes, edges[near]))
-
-
-def _meet(lowest: np.ndarray, highest: np.ndarray, box: np.ndarray) -> np.ndarray:
-    """Which boxes (..., 3) meet a box (2, 3)."""
-    out = (lowest[..., 0] <= box[1, 0]) & (highest[..., 0] >= box[0, 0])
-    for k in (1, 2):
-        out &= (lowest[..., k] <= box[1, k]) & (highest[..., k] >= box[0, k])
-    return out
 
 
 def _balls_in_planes(planes: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
@@ -230,22 +212,6 @@ def _balls_in_planes(planes: np.ndarray, centres: np.ndarray, radii: np.ndarray)
         np.put_along_axis(behind, nearest[:, :, None], 0.0, axis=2)
         depth[beside & (behind.max(axis=2) > 0.0)] = 0.0
     return depth.max(axis=1, initial=0.0)
-
-
-def _edges_in_planes(planes: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Depth (e,) of edges (e, 2, 3) behind planes (m, 4): the largest at both ends and in the middle of what is behind all."""
-    height = edges @ planes[:, :3].T - planes[:, 3]
-    at_p, at_q = height[:, 0], height[:, 1]
-    slope = at_q - at_p
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossing = -at_p / slope
-    begin = np.where(slope < 0.0, crossing, 0.0).max(axis=1, initial=0.0)
-    end = np.where(slope > 0.0, crossing, 1.0).min(axis=1, initial=1.0)
-    depth = np.zeros(len(edges))
-    for place in (begin, 0.5 * (begin + end), end):
-        np.maximum(depth, -(at_p + place[:, None] * slope).max(axis=1), out=depth)
-    # Edges in a plane of which they are in front have no crossing: the heights tell.
-    return np.where(begin <= end, depth, 0.0)
 
 
 def _distance_to_segment(points: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
