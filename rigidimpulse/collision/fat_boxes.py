@@ -198,7 +198,7 @@ class FatBoxes:
         self._capacity, self._near = max(64, 16 * n), np.empty((3, 0), np.int64)
 
     def renewed(self, now: MovingBodies, acceleration: np.ndarray, part: np.ndarray, ahead: float) -> tuple[np.ndarray, np.ndarray]:
-        """Ranks (k,) int32 of pairs that may meet, ascending, found anew; part: (n,) which bodies move and which stand."""
+        """Ranks (k,) int32 of pairs that may meet, ascending, found again; part: (n,) which bodies move and which stand."""
         bounds, fat = self.bounds, self.fat
         fat.boxed[:] = ~self._dynamic | (part != OUTSIDE)
         low, high = np.empty((2, len(bounds.order), 3))

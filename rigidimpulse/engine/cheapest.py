@@ -54,15 +54,15 @@ def exact_cost(solves, size):
 
 
 @jit
-def _judge_group(costs, root, cost, was_substepped, group, which, reason):
-    """Judge the islands of a group, which are stepped together; writes the reason of those that are refused."""
+def _judge_together(costs, root, cost, was_substepped, judged_with, which, reason):
+    """Judge the islands (n,) whose `judged_with` is `which`: they are stepped together. Writes the reason of those that are refused."""
     inside, before, total, pieces, looks, limit, exact = 0, False, 0.0, 0.0, 0.0, 0.0, 0.0
     for r in range(root.shape[0]):
-        if group[r] == which:
+        if judged_with[r] == which:
             total += cost[r]
     for i in range(root.shape[0]):
         r = root[i]
-        if r < 0 or group[r] != which:
+        if r < 0 or judged_with[r] != which:
             continue
         inside += 1
         limit = max(limit, costs.limit[i])
@@ -76,7 +76,7 @@ def _judge_group(costs, root, cost, was_substepped, group, which, reason):
     why = NOT_REFUSED if stays else SUBSTEPS_COST_MORE if before else CHEAP
     for i in range(root.shape[0]):
         r = root[i]
-        if r < 0 or group[r] != which:
+        if r < 0 or judged_with[r] != which:
             continue
         reason[r] = why
         if stays:
@@ -93,7 +93,7 @@ def judge_islands(costs, root, label, joined, touches, solve_count, reason):
     joined: (n,) bool. touches: (n,) bool by root. solve_count: (n,) how often the exact solver dealt with each body in the last step.
     """
     number, refused = root.shape[0], 0
-    size, group, cost = np.zeros(number, np.int64), np.full(number, APART, np.int64), np.zeros(number)
+    size, judged_with, cost = np.zeros(number, np.int64), np.full(number, APART, np.int64), np.zeros(number)
     has_joints, was_substepped = np.zeros(number, np.bool_), np.zeros(number, np.bool_)
     for i in range(number):
         r = root[i]
@@ -107,12 +107,12 @@ def judge_islands(costs, root, label, joined, touches, solve_count, reason):
         if size[r] > 0:
             factor = 1.0 if not has_joints[r] else JOINTED_SOLVE if touches[r] else FLIGHT
             cost[r] = factor * exact_cost(max(cost[r] / size[r], 1.0), size[r])
-            group[r] = r if has_joints[r] else TOGETHER if touches[r] else APART
-            reason[r] = ALONE if group[r] == APART else NOT_REFUSED
-    _judge_group(costs, root, cost, was_substepped, group, TOGETHER, reason)
+            judged_with[r] = r if has_joints[r] else TOGETHER if touches[r] else APART
+            reason[r] = ALONE if judged_with[r] == APART else NOT_REFUSED
+    _judge_together(costs, root, cost, was_substepped, judged_with, TOGETHER, reason)
     for r in range(number):
-        if group[r] == r:
-            _judge_group(costs, root, cost, was_substepped, group, r, reason)
+        if judged_with[r] == r:
+            _judge_together(costs, root, cost, was_substepped, judged_with, r, reason)
     for i in range(number):
         costs.pieces[i] = costs.looks[i] = 0.0
         costs.limit[i] = max(FADING * costs.limit[i], costs.first[i])

@@ -135,7 +135,7 @@ class _Tables:
         self.half: list[np.ndarray] = []
         self.half_space: list[np.ndarray] = []
         self.corners: list[np.ndarray] = []
-        self.planes: list[np.ndarray] = []
+        self.planes: list[np.ndarray] = []  # (m, 4) of each
         self.loops: list[list[int]] = []
         self.corner_first, self.face_first = [0], [0]
 
@@ -145,15 +145,19 @@ class _Tables:
         self.half_space.append(np.zeros(4) if half_space is None else half_space)
         self.corners.append(corners)
         self.corner_first.append(self.corner_first[-1] + len(corners))
-        self.face_first.append(len(self.planes))
+        self.face_first.append(len(self.loops))
 
     def add_polyhedron(self, corners: np.ndarray, normals: np.ndarray, triangles: np.ndarray, *, is_shape: bool) -> None:
         """Add a polyhedron with the outward normals (t, 3) of its triangles (t, 3); as a shape it is a BOX where it can be."""
         self.add(corners)
-        for normal, loop in faces(normals, triangles):
-            self.planes.append(np.append(normal, dot(corners[loop], normal).max()))
-            self.loops.append([self.corner_first[-2] + v for v in loop])
-        self.face_first[-1] = len(self.planes)
+        found = faces(normals, triangles)
+        of_face, loops = np.array([normal for normal, _ in found]), [loop for _, loop in found]
+        size_of_loop = np.array([len(loop) for loop in loops])
+        heights = dot(corners[np.concatenate(loops)], np.repeat(of_face, size_of_loop, axis=0))
+        farthest = np.maximum.reduceat(heights, np.cumsum(size_of_loop) - size_of_loop)
+        self.planes.append(np.column_stack([of_face, farthest]))
+        self.loops += [[self.corner_first[-2] + v for v in loop] for loop in loops]
+        self.face_first[-1] = len(self.loops)
         size = corners.max(0)
         # Eight corners at +- the same lengths: a box along the principal axes, which has kernels of its own.
         if is_shape and len(corners) == 8 and np.allclose(np.abs(corners), size, rtol=1e-12, atol=0.0):
@@ -194,7 +198,7 @@ def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | No
     return Polyhedra(
         half=np.array(tables.half).reshape(-1, 3), corner_first=np.array(tables.corner_first),
         corner=np.concatenate([*tables.corners, nothing]), face_first=np.array(tables.face_first),
-        plane=np.array(tables.planes).reshape(-1, 4), loop_first=np.cumsum([0, *map(len, tables.loops)]),
+        plane=np.concatenate([*tables.planes, np.zeros((0, 4))]), loop_first=np.cumsum([0, *map(len, tables.loops)]),
         loop=np.array([v for loop in tables.loops for v in loop], np.int64), half_space=np.array(tables.half_space).reshape(-1, 4),
         part_first=np.cumsum([0, *map(len, parts)]), part=np.array([which for which, _, _ in flat], np.int64),
         centre=np.array([centre for _, centre, _ in flat]).reshape(-1, 3), bound=np.array([bound for _, _, bound in flat]),

@@ -68,11 +68,16 @@ def _remainder(line, basis, held, out):
 
 @jit_making_arrays
 def joint_weights(joints, which, rows, start, weight):
-    """W of the rows of the joints listed in `which`, rows `start` and on; into weight (s,)."""
+    """W of the soft rows of the joints listed in `which`, rows `start` and on; into weight (s,), 0 for hard ones."""
     basis, out = np.empty((6, 12)), np.empty(12)
     first = 0
     for j in which:
-        held, count = 0, joints.first[j + 1] - joints.first[j]
+        held, count, soft = 0, joints.first[j + 1] - joints.first[j], False
+        for i in range(count):
+            weight[first + i], soft = 0.0, soft or joints.stiffness[joints.first[j] + i] < np.inf
+        if not soft:
+            first += count
+            continue
         for i in range(count):
             k, line = joints.first[j] + i, rows.jacobian[start + first + i]
             # An orthonormal basis of the hard rows: soft rows and limits act on what these leave free.
@@ -83,7 +88,8 @@ def joint_weights(joints, which, rows, start, weight):
                     held += 1
         for i in range(count):
             line = rows.jacobian[start + first + i]
-            weight[first + i] = max(_remainder(line, basis, held, out), LEAST_WEIGHT * np.sum(line * line))
+            if joints.stiffness[joints.first[j] + i] < np.inf:
+                weight[first + i] = max(_remainder(line, basis, held, out), LEAST_WEIGHT * np.sum(line * line))
         first += count
 
 

@@ -107,7 +107,7 @@ def overlap_depths(record: RunRecord) -> Depths:
     size, depth = np.minimum(world.size[a], world.size[b]), np.zeros(len(a))
     if not len(a):
         return Depths(found.frame, a, b, depth, size)
-    shapes, of, near = _Shapes(world), world.shape_of_body, np.arange(len(a))
+    shapes, of, near = MeasuredShapes(world), world.shape_of_body, np.arange(len(a))
     both = [(of[a], of[b], found.a_in_b), (of[b], of[a], _other_way(found.a_in_b))]
     for mine, other, posed in both:
         near = near[~shapes.surely_apart(mine[near], other[near], posed.part(near))]
@@ -120,10 +120,11 @@ def overlap_depths(record: RunRecord) -> Depths:
     return Depths(found.frame, a, b, depth, size)
 
 
-class _Shapes:
+class MeasuredShapes:
     """Probes and solids of the shapes of a world, by their numbers."""
 
     def __init__(self, world: World) -> None:
+        """Nothing is made before it is asked for."""
         self._world = world
         self._whole: dict[int, Solid] = {}
 

@@ -247,7 +247,7 @@ class SubsteppedIslands:
     def _refusals(
         self, run: Run, pair_events: PairEvents, near: np.ndarray, member: np.ndarray, joined: np.ndarray, solve_count: np.ndarray
     ) -> dict[int, str]:
-        """Why islands stay exact, by their root; but for tall ones, see `_low`."""
+        """Why islands stay exact, by their root; of tall ones see `_low`."""
         world, root = run.world, self._root
         if self.hand_over.cheapest is not None:
             refused = self.hand_over.cheapest.refusals(root, self.label, joined, self._touches, solve_count)

@@ -326,7 +326,7 @@ class ContactStepper:
         return min(step, SPAN * math.sqrt(float(self.inner[members].min()) / strength)) if strength > 0.0 else step
 
     def _renew_pairs(self, run: Run, ahead: float) -> None:
-        """Find the pairs anew that bodies which take part may meet in `ahead` s, among themselves and of those that stand."""
+        """Find again the pairs of bodies that take part and may meet in `ahead` s."""
         self.table.replace(*self.fat_boxes.renewed(run.state.now, run.acceleration, self._part, ahead))
         classify(self.table.pairs, self.bodies, self.shapes)
 
