@@ -11,11 +11,15 @@ import rigidimpulse as ri
 from rigidimpulse.collision.contact_records import CONTACT_MARGIN, SEPARATION
 from rigidimpulse.collision.manifold.dispatch import SEVERAL, Posed, pair_gap
 from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.engine.begin import make_plan, make_run
 from rigidimpulse.engine.compile_scene import compile_scene
-from rigidimpulse.engine.run import Run
+from rigidimpulse.engine.loop import run_to_end
+from rigidimpulse.engine.run import Run, start_trajectories
+from rigidimpulse.engine.substepped.advance import SubsteppedIslands
 from rigidimpulse.engine.substepped.contact_forces import COARSE, ContactStepper
 from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.model.plan import Plan
+from rigidimpulse.motion.trajectory import FIXED
 from rigidimpulse.recording.events import EventLog
 from rigidimpulse.recording.recorder import Recorder
 
@@ -157,6 +161,32 @@ def test_many_contacts_of_a_pair_are_all_found() -> None:
     run = ri.simulate(scene, 0.5, accuracy=SUB_STEPPED)
     assert run.status.ok, run.status.message
     np.testing.assert_allclose(run.positions[-1, run.index("rake")], (0, 0, 0.35), atol=5e-3)
+
+
+def test_a_body_may_have_more_parts_than_there_is_memory_for_at_first() -> None:
+    """A floor of 300 planks: one cube comes before it in the order of the bodies, one after it. They rest at their margin, 1.6 mm."""
+    planks = [(ri.Shape.box((0.1, 1.0, 0.2)), (0.1 * k - 15.0, 0, -0.1), UPRIGHT) for k in range(300)]
+    scene = ri.Scene()
+    scene.add(ri.Body("floor", ri.Shape.compound(planks), position=(0.0, 0.0, 0.0), motion="static", material=ROUGH))
+    for x in (-14.0, 14.0):
+        scene.add(ri.Body(f"cube {x}", octants(0.4), position=(x, 0, 0.21), material=ROUGH))
+    run = ri.simulate(scene, 0.5, accuracy=SUB_STEPPED)
+    assert run.status.ok, run.status.message
+    np.testing.assert_allclose(run.positions[-1, 1:], [(-14.0, 0.0, 0.2), (14.0, 0.0, 0.2)], atol=2.5e-3)
+
+
+def test_smaller_shapes_are_not_made_of_bodies_of_convex_parts() -> None:
+    """They stand in for meshes. To make them took a sixth of a run of twelve rings in convex parts, when bodies fell asleep."""
+    scene = ri.Scene()
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=ROUGH))
+    scene.add(ri.Body("angle", angle(), position=(0, 0, 0.35), material=ROUGH))
+    world = compile_scene(scene, SUB_STEPPED)
+    run = make_run(world, make_plan(world), Recorder(np.arange(181) / 60.0, 2), EventLog())
+    start_trajectories(run)
+    run_to_end(run, 3.0, None)
+    assert isinstance(run.substepped, SubsteppedIslands)
+    assert run.state.trajectory.mode[1] == FIXED
+    assert "smaller" not in vars(run.substepped.stepper)
 
 
 def test_any_number_of_shares_gives_the_same_bits() -> None:
