@@ -131,19 +131,19 @@ def asked(regime: CheapestRegime, label: np.ndarray, solves: float, joined: bool
 
 def test_an_island_goes_to_sub_steps_where_exact_contact_costs_more() -> None:
     """The exact regime costs s e(3); sub-steps are expected to cost FIRST. Where nothing is near there is nothing to step."""
-    dear = 1.01 * FIRST / float(exact_cost.py_func(1.0, 3))
-    assert asked(CheapestRegime(np.zeros(3, bool)), NONE, dear) == ""
-    assert asked(CheapestRegime(np.zeros(3, bool)), NONE, 0.98 * dear) == REASONS[2]
-    assert asked(CheapestRegime(np.zeros(3, bool)), NONE, dear, touches=False) == REASONS[1]
+    costly = 1.01 * FIRST / float(exact_cost.py_func(1.0, 3))
+    assert asked(CheapestRegime(np.zeros(3, bool)), NONE, costly) == ""
+    assert asked(CheapestRegime(np.zeros(3, bool)), NONE, 0.98 * costly) == REASONS[2]
+    assert asked(CheapestRegime(np.zeros(3, bool)), NONE, costly, touches=False) == REASONS[1]
 
 
 @pytest.mark.parametrize("touches", [True, False])
 def test_joints_count_as_many_solves(touches: bool) -> None:
     factor = JOINTED_SOLVE if touches else FLIGHT
-    dear = 1.01 * JOINTED_PIECE / (factor * float(exact_cost.py_func(1.0, 3)))
+    costly = 1.01 * JOINTED_PIECE / (factor * float(exact_cost.py_func(1.0, 3)))
     for part, why in ((1.0, ""), (0.98, REASONS[2])):
-        expected = why if part * dear > 1.0 else asked(CheapestRegime(np.ones(3, bool)), NONE, 1.0, True, touches)
-        assert asked(CheapestRegime(np.ones(3, bool)), NONE, part * dear, True, touches) == expected
+        expected = why if part * costly > 1.0 else asked(CheapestRegime(np.ones(3, bool)), NONE, 1.0, True, touches)
+        assert asked(CheapestRegime(np.ones(3, bool)), NONE, part * costly, True, touches) == expected
 
 
 def test_sub_steps_that_cost_more_than_they_save_end_and_are_remembered() -> None:
