@@ -229,7 +229,7 @@ class SubsteppedIslands:
         links = run.joints.links()
         connect_members(near, links, member, root, self._touches)
         joined = np.zeros_like(member)
-        if len(links):
+        if self._jointed.any():
             joined[run.joints.bodies_of(run.joints.at(np.flatnonzero(member & self._jointed)))] = True
         refused = self._refusals(run, pair_events, near, member, joined, solve_count)
         chosen = member & ~np.isin(root, list(refused)) if refused else member.copy()
@@ -310,7 +310,7 @@ class SubsteppedIslands:
     def _settle(self, run: Run, chosen: np.ndarray, near: np.ndarray, links: np.ndarray, time: float) -> None:
         """Label the islands; put to sleep those that have been sleepy for long, and members that are far from moving ones."""
         root, driven = self._root, np.zeros_like(chosen)
-        if len(links):
+        if self._jointed.any():
             for r in np.unique(root[chosen & self._jointed]).tolist():
                 driven[r] = self._is_driven(run, np.flatnonzero(chosen & (root == r)))
         sleeps = settle_islands(run.state.now, self._candidates, near, links, chosen, root, driven, self._rest)
