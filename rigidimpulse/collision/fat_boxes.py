@@ -85,7 +85,7 @@ def stay_in_boxes(bounds, fat, now, acceleration, part, ahead):
             continue
         if not fat.boxed[i]:
             return False
-        if part[i] == SUPPORT:
+        if part[i] == SUPPORT or not bounds.moves[i]:
             continue
         away = 0.0
         for k in range(3):

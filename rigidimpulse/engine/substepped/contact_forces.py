@@ -631,7 +631,7 @@ class ContactStepper:
             self._go_on(run, LIST)
 
     def begin_step(self, run: Run, begin: float, end: float) -> bool:
-        """Whether frames fall between `begin` and `end`, s, in the step of what was loaded."""
+        """Begin the step of what was loaded; returns whether frames fall between `begin` and `end`, s."""
         has_frames = run.recorder.has_frames(begin, end)
         self._step = self._step._replace(has_frames=has_frames)
         self._waypoints.number[0] = 0

@@ -113,7 +113,8 @@ class JointedStepper:
 
     def _spun_up(self, out: Outcome) -> float:
         """How often in a second sub-steps must begin for how members turn at the end, 1/s; 0 if they began about as often."""
-        stray, step = self._stray(out.members, out.velocity[:, 3:]), self._world.accuracy.step
+        # A part of wider rows would be another type.
+        stray, step = self._stray(out.members, np.ascontiguousarray(out.velocity[:, 3:])), self._world.accuracy.step
         wanted = min(stray * step, MOST_SUB_STEPS)
         return stray if wanted * self._stepper.sub_step_length > SPUN_UP * step else 0.0
 
