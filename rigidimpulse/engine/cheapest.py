@@ -153,6 +153,11 @@ class CheapestRegime:
                 return True
         return False
 
+    def most_solves(self, moving: int, joined: np.ndarray) -> float:
+        """How often the exact solver may deal with all bodies in a step before `may_begin` can say yes; 0 where it always can."""
+        most = FIRST / float(exact_cost.py_func(1.0, moving))
+        return 0.0 if joined.any() or most < 1.0 else most
+
     def refusals(
         self, root: np.ndarray, label: np.ndarray, joined: np.ndarray, touches: np.ndarray, solve_count: np.ndarray
     ) -> dict[int, str]:

@@ -1,7 +1,8 @@
 """Runs that end before their time: by Ctrl-C, or because there is no more memory.
 
-The first Ctrl-C ends the run after the step that it is in: what was computed until then is whole. The second ends it at once, as
-everywhere. Only the main thread of a program hears of Ctrl-C. A program that deals with it in its own way keeps its own way.
+The first Ctrl-C ends the run after the step that it is in, or the steps that a kernel takes at once: what was computed until then is whole.
+The second ends it at once, as everywhere. Only the main thread of a program hears of Ctrl-C. A program that deals with it in its own way
+keeps its own way.
 """
 
 from __future__ import annotations

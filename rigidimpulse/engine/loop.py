@@ -22,18 +22,21 @@ WATCHED = 64
 """Steps at most between two looks at a run that somebody watches."""
 
 
-def run_to_end(run: Run, duration: float, progress: Callable[[float], None] | None) -> None:
-    """Step to the end; a run that is under way goes on from where it is."""
+def run_to_end(run: Run, duration: float, progress: Callable[[float], None] | None, every_step: bool = True) -> None:
+    """Step to the end; a run that is under way goes on from where it is. Arguments as of `run_steps`."""
     # The last frame may lie after the end by rounding; what happens until the end does not depend on that.
     for end in (float(duration), max(float(duration), float(run.recorder.times[-1]))):
         if run.plan.steps:
-            run_steps(run, end, progress)
+            run_steps(run, end, progress, every_step)
         else:
             run.keyframes.start_segments(run, end)
 
 
-def run_steps(run: Run, end: float, progress: Callable[[float], None] | None) -> None:
-    """Step to the end [s]; progress: called with the time of the run after each step, or after WATCHED at most.
+def run_steps(run: Run, end: float, progress: Callable[[float], None] | None, every_step: bool = True) -> None:
+    """Step to the end [s].
+
+    progress: called with the time of the run after each step, or after WATCHED at most: in which only impacts of balls happened, or, where
+    not `every_step` is asked for, that needed nothing but exact contact.
 
     There is no step of the length of a rounding error: in one of 4e-16 s springs pushed dominoes at 2e9 m/s.
     """
@@ -50,7 +53,7 @@ def run_steps(run: Run, end: float, progress: Callable[[float], None] | None) ->
         how = fly(run, stop) if run.flight.may_fly() else STEP
         if how == STEP:
             boundary = run.soft_bodies.advance(run, step_end.py_func(state.time, stop, size))
-            step(run, boundary, until=stop if progress is None else boundary)
+            step(run, boundary, until=boundary if progress is not None and every_step else stop)
         if progress is not None:
             progress(state.time)
 

@@ -124,7 +124,8 @@ def _simulate(
         settings = _settings(asked, run)
         with listening(progress) as look:
             if cache is None:
-                recording = complete(run, duration, look)
+                # Who listens to Ctrl-C alone need not be asked at every step: a die took one and a half times as long.
+                recording = complete(run, duration, look, every_step=progress is not None)
             else:
                 with closing(provider("checkpoints")(cache, settings, run)) as checkpointer:
                     recording = _complete_in_cache(checkpointer, duration, look)
@@ -181,10 +182,15 @@ def prepare(
     return begin_run(world, make_plan(world, effects), times, left_out, earlier)
 
 
-def complete(run: Run, duration: float, progress: Callable[[float], None] | None = None) -> SimulatedRecording:
-    """Step a run to its end at `duration` [s], or until `progress` raises `Stopped`; hand back what was recorded."""
+def complete(
+    run: Run, duration: float, progress: Callable[[float], None] | None = None, every_step: bool = True
+) -> SimulatedRecording:
+    """Step a run to its end at `duration` [s], or until `progress` raises `Stopped`; hand back what was recorded.
+
+    every_step: see `run_steps`.
+    """
     try:
-        run_to_end(run, duration, progress)
+        run_to_end(run, duration, progress, every_step)
         return finish_run(run, duration)
     except Stopped:
         return finish_early(run, duration)

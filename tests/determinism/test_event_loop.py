@@ -17,6 +17,7 @@ from rigidimpulse.engine.absent import NoCompiledLoop
 from rigidimpulse.engine.exact.compiled_loop import CompiledLoop
 from rigidimpulse.engine.exact.event_loop import MOST_EVENTS, run_events
 from rigidimpulse.engine.simulate import complete, prepare
+from rigidimpulse.scene.accuracy import Preset
 
 FPS = 60.0
 
@@ -179,6 +180,23 @@ def test_steps_of_exact_contact_follow_each_other_without_python() -> None:
     events = run.plan.line("impact time").calls
     assert np.all(recording.velocities[-1] == 0.0) and events > 20
     assert run_events.calls - before <= 2 + events // MOST_EVENTS
+
+
+@pytest.mark.parametrize("accuracy", ["standard", "preview"])
+def test_who_listens_only_is_not_asked_at_every_step(accuracy: Preset) -> None:
+    """`simulate` always listens to Ctrl-C. Steps that need nothing but exact contact follow each other all the same, with the same bits."""
+    scene = floor(ri.Scene())
+    scene.add(ri.Body("die", ri.Shape.box(0.016), position=(0, 0, 1.0), orientation=(0.9, 0.3, 0.1, 0.2), velocity=(0.3, 0.0, 0.0)))
+    calls, hashes = [], []
+    for every_step in (True, False):
+        run, heard = prepare(scene, np.arange(25) / FPS, accuracy), []
+        run.compiled = CompiledLoop(run)
+        before = run_events.calls
+        hashes.append(complete(run, 0.4, heard.append, every_step).state_hash())
+        calls.append((run_events.calls - before, len(heard)))
+    # It falls for 0.44 s: nothing happens in 24 steps.
+    assert calls == [(24, 24), (1, 1)]
+    assert hashes[0] == hashes[1] == ri.simulate(scene, 0.4, accuracy=accuracy).state_hash()
 
 
 def test_problems_are_told_alike_by_runs_that_are_watched_and_others() -> None:

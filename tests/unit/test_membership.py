@@ -146,6 +146,23 @@ def test_joints_count_as_many_solves(touches: bool) -> None:
         assert asked(CheapestRegime(np.ones(3, bool)), NONE, part * costly, True, touches) == expected
 
 
+@pytest.mark.parametrize("number", range(1, 15))
+def test_nobody_is_asked_where_no_island_can_be_worth_sub_steps(number: int) -> None:
+    """Below `most_solves` of all bodies `may_begin` says no, however they are shared out. Of twelve bodies and more it may always say yes.
+
+    Joints ask at every step.
+    """
+    rng, alone = np.random.default_rng(number), np.zeros(number, bool)
+    regime = CheapestRegime(alone)
+    most = regime.most_solves(number, alone)
+    assert (most > 0.0) == (number < 12)
+    for _ in range(200 if most else 0):
+        solves = rng.dirichlet(np.full(number, 0.3)) * most * rng.uniform(0.0, 1.0 - 1e-9)
+        assert not regime.may_begin(solves, number, alone)
+    assert regime.may_begin(np.full(number, 1.001 * max(most, 1.0)), number, alone)
+    assert regime.most_solves(number, ~alone) == 0.0
+
+
 def test_sub_steps_that_cost_more_than_they_save_end_and_are_remembered() -> None:
     """What was measured is expected from then on, and fades."""
     regime, solves = CheapestRegime(np.zeros(3, bool)), 2.0 * FIRST / float(exact_cost.py_func(1.0, 3))

@@ -47,8 +47,10 @@ class HandOver:
         self._auto = world.accuracy.contact_solver == "auto"
         self.open = np.zeros(world.num_bodies, bool)
         # Nothing is handed over where everything is sub-stepped.
-        first = 0.0 if self._auto or cheapest else NEVER
-        self.counts = make_counts(world.num_bodies, first, most_solves_of_all(world) if self._auto else ASK)
+        first, most = 0.0 if self._auto or cheapest else NEVER, most_solves_of_all(world) if self._auto else ASK
+        if cheapest is not None:
+            most = cheapest.most_solves(int(np.count_nonzero(world.dynamic)), jointed) or ASK
+        self.counts = make_counts(world.num_bodies, first, most)
         self._handed: dict[tuple[str, ...], int] = {}
 
     @property
