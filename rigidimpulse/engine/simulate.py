@@ -67,7 +67,7 @@ def simulate(
             where they are free or in exact contact; see docs/guide/caches.md.
 
     Returns:
-        The recording, with round(duration * fps) + 1 frames; the first is the initial state. Ctrl-C stops the run after the step that it is
+        The recording, with round(duration * fps) + 1 frames; the first is the initial state. Ctrl-C stops the run after the step or steps that it is
         in: the recording has the frames until then, and its status is not ok and says "partial". A second Ctrl-C raises KeyboardInterrupt.
 
     Raises:
