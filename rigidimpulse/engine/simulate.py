@@ -67,8 +67,9 @@ def simulate(
             where they are free or in exact contact; see docs/guide/caches.md.
 
     Returns:
-        The recording, with round(duration * fps) + 1 frames; the first is the initial state. Ctrl-C stops the run after the step or steps that it is
-        in: the recording has the frames until then, and its status is not ok and says "partial". A second Ctrl-C raises KeyboardInterrupt.
+        The recording, with round(duration * fps) + 1 frames; the first is the initial state. Ctrl-C stops the run after the step that it is
+        in, or the steps that are taken at once: the recording has the frames until then, and its status is not ok and says "partial". A
+        second Ctrl-C raises KeyboardInterrupt.
 
     Raises:
         SceneError: the scene cannot be simulated as it is; names the body, the value and the remedy. Or an effect is unknown, cannot be
