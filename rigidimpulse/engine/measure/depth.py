@@ -255,10 +255,15 @@ def _depth_in_surface(solid: Solid, points: np.ndarray, radii: np.ndarray) -> np
     corners = solid.surface.reshape(-1, 3)
     low, high = (-solid.bounds[:3, 3], solid.bounds[3:6, 3]) if len(solid.bounds) else (-np.inf, np.inf)
     near = np.all((points > low - radii[:, None]) & (points < high + radii[:, None]), axis=2)
-    for c in np.flatnonzero(near.any(axis=1)).tolist():
-        centres, r = points[c, near[c]], radii[near[c]]
-        inside = points_inside(geometry, index, centres)
-        chosen = np.flatnonzero(inside | (r > 0.0))
+    pose, place = np.nonzero(near)
+    if not len(pose):
+        return depth
+    # All poses at once: to ask pose by pose took longer than to answer.
+    centres, r = points[pose, place], radii[place]
+    inside = points_inside(geometry, index, centres)
+    counts = np.flatnonzero(inside | (r > 0.0))
+    for c in np.unique(pose[counts]).tolist():
+        chosen = counts[pose[counts] == c]
         if len(chosen) > DEEPEST:
             far = np.linalg.norm(centres[chosen, None] - corners[None, :: max(len(corners) // MOST_EDGES, 1)], axis=2).min(axis=1)
             chosen = chosen[np.argsort(np.where(inside[chosen], -far, far), kind="stable")[:DEEPEST]]

@@ -201,10 +201,8 @@ class _Padded:
 
 
 def _work(probe: Probe, solid: Solid) -> int:
-    """Numbers that a candidate takes: products of probes and faces of one part; of edges those near it only, so their ends count."""
-    faces = max([1, len(solid.surface), *map(len, solid.convex)])
-    ends = 2 * len(probe.edges)
-    return len(probe.radii) * faces + ends * (faces if len(solid.surface) else OF_EDGE)
+    """Numbers that a candidate takes: products of balls and faces of one part, and some for each end of an edge."""
+    return len(probe.radii) * max([1, *map(len, solid.convex)]) + 2 * len(probe.edges) * OF_EDGE
 
 
 def _other_way(posed: Posed) -> Posed:
