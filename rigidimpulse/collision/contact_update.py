@@ -1,7 +1,8 @@
 """Contacts of general pairs: those for which the contact cache has no kernel of its own.
 
 The kernels of `manifold.dispatch` need bodies that are apart, and soft contacts sink in. So the search is done with smaller shapes, and
-what it finds is put back on the true ones (`manifold.smaller_shapes`). If even these overlap, a pair keeps the contacts it had before.
+what it finds is put back on the true ones (`manifold.smaller_shapes`). Where even these overlap, two convex bodies get contacts of the true
+ones (`manifold.penetrating`), and so do corners of a mesh in a convex body (`manifold.sunk_corners`). Other pairs keep those they had.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from rigidimpulse.collision.manifold.polyhedra import Points as Found
 from rigidimpulse.collision.manifold.reduce import GAP_WEIGHT, PER_NORMAL, reduce_contacts
 from rigidimpulse.collision.manifold.rounding import only_primitive, side_radius
 from rigidimpulse.collision.manifold.smaller_shapes import level_of, put_back
+from rigidimpulse.collision.manifold.sunk_corners import sunk_corners
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.vector import along, dot, row, turned_by
 
@@ -226,6 +228,11 @@ def store_contacts(shapes, bodies, table, searched, found, count, order, coeffic
         # Bodies deeper inside each other than the smaller shapes allow: contacts from the true ones.
         if convex[a] and convex[b] and not _is_sound(smaller, bodies, a, b, found, first, last):
             deep_count = overlap_contacts(solids, bodies, a, b, size, scratch, Found(deep, deep_ids))
+        elif convex[a] != convex[b] and smaller.depth[a] + smaller.depth[b] > 0.0:
+            # Points of a star that spun went through a floor: once the smaller shapes cross, they find nothing.
+            ends = (b, a) if convex[a] else (a, b)
+            allowed = smaller.depth[a] + smaller.depth[b]
+            deep_count = sunk_corners(smaller.geometry, solids, bodies, ends, allowed, Found(deep, deep_ids))
         for s in range(deep_count if deep_count > 0 else last - first):
             contact = (deep, s) if deep_count > 0 else (real, first + s)
             separation = _write(smaller.geometry, bodies, pairs, p, contact, coefficients, points, used)
