@@ -125,7 +125,7 @@ def _simulate(
         settings = _settings(asked, run)
         with listening(progress) as look:
             if cache is None:
-                # Who listens to Ctrl-C alone need not be asked at every step: a die took one and a half times as long.
+                # Who listens to Ctrl-C alone need not be asked at every step: a die took a quarter longer.
                 recording = complete(run, duration, look, every_step=progress is not None)
             else:
                 with closing(provider("checkpoints")(cache, settings, run)) as checkpointer:
