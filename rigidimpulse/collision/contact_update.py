@@ -228,7 +228,7 @@ def store_contacts(shapes, bodies, table, searched, found, count, order, coeffic
         # Bodies deeper inside each other than the smaller shapes allow: contacts from the true ones.
         if convex[a] and convex[b] and not _is_sound(smaller, bodies, a, b, found, first, last):
             deep_count = overlap_contacts(solids, bodies, a, b, size, scratch, Found(deep, deep_ids))
-        elif convex[a] != convex[b] and smaller.depth[a] + smaller.depth[b] > 0.0:
+        elif convex[a] != convex[b] and smaller.polyhedron[a] != smaller.polyhedron[b] and smaller.depth[a] + smaller.depth[b] > 0.0:
             # Points of a star that spun went through a floor: once the smaller shapes cross, they find nothing.
             ends = (b, a) if convex[a] else (a, b)
             allowed = smaller.depth[a] + smaller.depth[b]
