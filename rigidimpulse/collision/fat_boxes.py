@@ -213,10 +213,15 @@ class FatBoxes:
             first, second = first[may], second[may]
         return first, second
 
-    def near(self, pairs: ContactPairs, now: MovingBodies, acceleration: np.ndarray, part: np.ndarray, ahead: float) -> np.ndarray | None:
-        """Pairs (a, b, may touch) by index, a of lower rank, that may meet in `ahead` s, (3, k); None where `pairs` must be renewed."""
+    def space_for(self, pairs: ContactPairs) -> np.ndarray:
+        """Space (3, k) for as many pairs as `near_pairs` may find among these."""
         if self._near.shape[1] < len(pairs.first):
             self._near = np.empty((3, 2 * len(pairs.first)), np.int64)
-        count = near_pairs(self.bounds, self.fat, pairs, now, acceleration, part, ahead, self._near)
+        return self._near
+
+    def near(self, pairs: ContactPairs, now: MovingBodies, acceleration: np.ndarray, part: np.ndarray, ahead: float) -> np.ndarray | None:
+        """Pairs (a, b, may touch) by index, a of lower rank, that may meet in `ahead` s, (3, k); None where `pairs` must be renewed."""
+        space = self.space_for(pairs)
+        count = near_pairs(self.bounds, self.fat, pairs, now, acceleration, part, ahead, space)
         # A view would be of another type where it is whole.
-        return None if count < 0 else self._near[:, :count].copy()
+        return None if count < 0 else space[:, :count].copy()

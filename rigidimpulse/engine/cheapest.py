@@ -121,34 +121,39 @@ def judge_islands(costs, root, label, joined, touches, solve_count, reason):
 
 
 class CheapestRegime:
-    """What is known of the costs of both regimes, of n bodies."""
+    """What is known of the costs of both regimes, of n bodies.
+
+    Attributes:
+        costs: the same in numbers.
+
+    """
 
     def __init__(self, joined: np.ndarray) -> None:
         """Nothing is known yet; joined (n,) bool: bodies with joints."""
         first, none = np.where(joined, FIRST_JOINTED, FIRST), np.zeros((3, len(joined)))
-        self._costs = Costs(first, first.copy(), *none)
+        self.costs = Costs(first, first.copy(), *none)
         self._reason = np.zeros(len(joined), np.int64)
 
     def carry_on(self, earlier: CheapestRegime, old: np.ndarray, new: np.ndarray) -> None:
         """Know of bodies `new` (k,) what is known there of `old` (k,)."""
-        for mine, theirs in zip(self._costs[1:], earlier._costs[1:], strict=True):
+        for mine, theirs in zip(self.costs[1:], earlier.costs[1:], strict=True):
             mine[new] = theirs[old]
 
     def note(self, members: np.ndarray, looks: int) -> None:
         """Members were stepped together over a piece of a step, with this number of looks at their contacts."""
-        self._costs.pieces[members] += 1.0
-        self._costs.looks[members] += looks
+        self.costs.pieces[members] += 1.0
+        self.costs.looks[members] += looks
 
     def handed_over(self, members: np.ndarray, solves: float) -> None:
         """Members were handed to sub-steps in the middle of a step, when the exact regime had solved one that often."""
-        self._costs.exact[members] = exact_cost.py_func(solves, len(members))
+        self.costs.exact[members] = exact_cost.py_func(solves, len(members))
 
     def may_begin(self, solve_count: np.ndarray, moving: int, joined: np.ndarray) -> bool:
         """Whether any island may be worth sub-steps; moving: how many bodies can move, joined (n,) bool: have joints."""
         with_joints = FLIGHT if np.count_nonzero(joined) == 1 else JOINTED_SOLVE
         for bodies, factor in ((~joined, 1.0), (joined, with_joints)):
             size = min(moving, int(np.count_nonzero(bodies)))
-            limit = self._costs.limit[bodies]
+            limit = self.costs.limit[bodies]
             if size and factor * exact_cost.py_func(max(float(solve_count[bodies].max()), 1.0), size) > float(limit.min()):
                 return True
         return False
@@ -162,6 +167,6 @@ class CheapestRegime:
         self, root: np.ndarray, label: np.ndarray, joined: np.ndarray, touches: np.ndarray, solve_count: np.ndarray
     ) -> dict[int, str]:
         """Why islands stay exact, or become so again, by their root; see `judge_islands`."""
-        if not judge_islands(self._costs, root, label, joined, touches, solve_count, self._reason):
+        if not judge_islands(self.costs, root, label, joined, touches, solve_count, self._reason):
             return {}
         return {r: REASONS[self._reason[r]] for r in np.flatnonzero(self._reason).tolist()}

@@ -1,7 +1,8 @@
 """From step to step: steps end on the grid of the accuracy's step, at keyframes, and where soft bodies ask for it.
 
 The kernel of balls (`spheres/`) takes many steps at once, as long as only simple impacts of balls happen in them. So does the compiled
-order of events (`exact/event_loop.py`), as long as they need nothing but exact contact and nobody watches the run.
+order of events (`exact/event_loop.py`), as long as they need nothing but exact contact and nobody watches the run, and so do sub-stepped
+islands (`substepped/calm_steps.py`) as long as nothing else moves.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from rigidimpulse.engine.effects import EventKernel
 from rigidimpulse.engine.exact.step_begin import GRID, step_end
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.spheres.effect import ARRIVED, GO_ON, STEP
-from rigidimpulse.engine.step import go_on, step
+from rigidimpulse.engine.step import finish_step, go_on, step
 from rigidimpulse.motion.trajectory import FIXED
 
 WATCHED = 64
@@ -53,9 +54,19 @@ def run_steps(run: Run, end: float, progress: Callable[[float], None] | None, ev
         how = fly(run, stop) if run.flight.may_fly() else STEP
         if how == STEP:
             boundary = run.soft_bodies.advance(run, step_end.py_func(state.time, stop, size))
-            step(run, boundary, until=boundary if progress is not None and every_step else stop)
+            take_steps(run, boundary, until=boundary if progress is not None and every_step else stop)
         if progress is not None:
             progress(state.time)
+
+
+def take_steps(run: Run, end: float, until: float) -> None:
+    """Step to `end` [s], or by whole steps as far as `until` [s] where they need nothing but exact contact, or nothing but sub-steps."""
+    begin = run.state.time
+    left = run.substepped.take_calm_steps(run, end, until)
+    if left is not None:
+        finish_step(run, left, until)
+    elif run.state.time == begin:
+        step(run, end, until)
 
 
 def fly(run: Run, stop: float) -> int:

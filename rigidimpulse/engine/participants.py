@@ -261,6 +261,10 @@ class Substepping(Protocol):
         """How often the exact regime deals with the bodies."""
         ...
 
+    def take_calm_steps(self, run: Any, end: float, until: float, /) -> Any:
+        """Take steps as long as nothing moves but members; returns the pairs of a step that the loop must finish, else None."""
+        ...
+
     def choose(self, run: Any, pair_events: Any, /) -> None:
         """Choose the islands of the step."""
         ...

@@ -27,7 +27,15 @@ def step(run: Run, end: float, until: float) -> None:
     """Advance all trajectories to `end` [s], or by whole steps as far as `until` [s] where events need nothing but exact contact."""
     pair_events = PairEvents(run, end)
     run.plan.perform(run.plan.pairs, run, pair_events)  # sub-stepped islands, which of them sleep; broad phase
-    time, bodies = pair_events.begin, pair_events.active_bodies()  # load: resting, jointed, pushed, sub-stepped
+    finish_step(run, pair_events, until)
+
+
+def finish_step(run: Run, pair_events: PairEvents, until: float) -> None:
+    """The rest of a step whose pairs are known."""
+    if pair_events.substepped_begun:  # members have been stepped from its begin on
+        time, bodies = next_event(run, pair_events)
+    else:
+        time, bodies = pair_events.begin, pair_events.active_bodies()  # load: resting, jointed, pushed, sub-stepped
     while time < pair_events.end:
         time, bodies = run.compiled.advance(run, pair_events, (time, bodies), until)  # what needs nothing but exact contact
         if time < pair_events.end:

@@ -49,12 +49,14 @@ from rigidimpulse.engine.run import Run, start_trajectories
 from rigidimpulse.engine.sleeping import advance_sleep_timers, stands_still
 from rigidimpulse.engine.spheres.run import EventRun
 from rigidimpulse.engine.step import step
+from rigidimpulse.engine.substepped.calm_step import KEEPS_CHEAP, Choice, Landing, begin_calm_step, is_calm, land_members
 from rigidimpulse.engine.substepped.contact_forces import COARSE, ContactStepper
 from rigidimpulse.engine.substepped.island_step import energies_of_islands
 from rigidimpulse.engine.substepped.jointed import JointedStepper
+from rigidimpulse.engine.substepped.member_paths import MemberPaths
 from rigidimpulse.engine.substepped.membership import Candidates, connect_members, gather_members, settle_islands
 from rigidimpulse.engine.substepped.sharing import Sharing
-from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
+from rigidimpulse.engine.substepped.trajectories import depart, let_fly, mark_slow
 from rigidimpulse.engine.warm_up import (
     ANY_SHAPES,
     CONTACTS,
@@ -229,21 +231,41 @@ def _stand_beside_sub_steps(run: Run) -> None:
     candidates = Candidates(
         world.dynamic, world.moving, ~member, world.mass, stepper.inner, steady, world.steady_strength, label, none, ~member
     )
+    _take_calm_step(run, stepper, candidates)
     gather_members(run.motion, candidates, 0.0, (1.0, 1.0), member)
     connect_members(near, links, member, root, ~member)
     settle_islands(state.now, candidates, near, links, member, root, ~member, 1.0)
     CheapestRegime(~member).refusals(root, label, ~member, member, none)
     energies_of_islands(state.now, world.constants, members, label, np.zeros((3, 1)), np.zeros((4, world.num_bodies)))
+    MemberPaths(world, label).end(run, members, 0.0)
+    stepper.end_of(state.now, members, stepper.at_once, (0.0, STEP))
     refusals(world, Judged(root, member, ~member, member, member, none), (near[0], near[1]), True)
     support_levels(stepper.bodies, stepper.table.pairs, stepper.table.points, TALL)
     poses, now = (np.zeros((1, 3)), np.zeros((1, 4)), np.zeros((1, 6))), state.now
-    end_trajectories(state.trajectory, members, 0.0, steady, now, state.rotation, run.acceleration, run.angular_acceleration)
     depart(state.trajectory, members, 0.0, STEP, now, *poses)
     let_fly(state.trajectory, members, steady)
     mark_slow(now, stepper.inner, (1.0, 1.0), np.array([False, True]))
-    most_stray(now, members, stepper.pressed, stepper.reach, stepper.skin, 0.5)
     of_sleep = world.steady_strength, stepper.inner, stepper.skin
     advance_sleep_timers(members, poses, of_sleep, STEP, np.zeros((2, 7)), np.zeros(2))
+
+
+def _take_calm_step(run: Run, stepper: ContactStepper, candidates: Candidates) -> None:
+    """What a step calls in which nothing moves but members, beside its sub-steps."""
+    world, state, n, member = run.world, run.state, run.world.num_bodies, np.array([False, True])
+    choice = Choice(
+        KEEPS_CHEAP, (1.0, 1.0), 1.0, run.substepped.counts, CheapestRegime(~member).costs, member.copy(), member.copy(),
+        np.zeros(n, np.int64), ~member, np.zeros((0, 2), np.int64), ~member,
+    )  # fmt: skip
+    landing = Landing(
+        world.constants, stepper.pressed, candidates.label, np.zeros((4, n)), np.zeros((n, 7)), np.zeros(n), stepper.inner, stepper.skin,
+    )  # fmt: skip
+    is_calm(state.trajectory, world.constants)
+    pairs = stepper.table.pairs
+    begin_calm_step(choice, candidates, stepper.around, run.motion, pairs, stepper.fat_boxes.space_for(pairs), (0.0, STEP))
+    stepper.load(run, np.array([1]), np.array([0]), STEP)
+    places = np.array([stepper.rank[1]]), np.zeros((1, 3)), np.zeros((1, 4)), np.zeros((1, 6)), np.zeros((3, 1))
+    recorded = run.recorder.frames, run.recorder.written
+    land_members(stepper.island, landing, run.motion, state.correction, recorded, np.array([1]), places, (0.0, STEP))
 
 
 def _step_island(run: Run, sharing: Sharing | None = None) -> None:

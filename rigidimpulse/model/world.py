@@ -163,10 +163,14 @@ class World:
         """Effects of the stage observe: volumes that report overlap."""
         return [] if "triggers" in self.left_out else [effect for effect in self.scene.effects if effect.stage == "observe"]
 
-    @property
+    @cached_property
     def can_collide(self) -> bool:
-        """Whether any two bodies may ever come to an impact: a dynamic one and another, unless springs push them apart."""
-        return bool(self.dynamic.any()) and self.num_bodies > 1 and self.accuracy.response != "penalty"
+        """Whether any two bodies may ever come to an impact: a dynamic one and another, unless springs push them apart.
+
+        Bodies that are let go later count from the start: steps are taken at once by what it says then.
+        """
+        ever_dynamic = any(body.motion == "dynamic" for body in self.scene.bodies)
+        return ever_dynamic and self.num_bodies > 1 and self.accuracy.response != "penalty"
 
     @property
     def why_no_impacts(self) -> str:

@@ -133,10 +133,8 @@ class CompiledLoop:
         state = run.state
         pairs = np.empty((most_pairs(n), 2), np.int32)
         self._steps = Steps(np.zeros(2), world.static_min, world.static_max, pairs)
-        # Others look at the run between two steps, or take its steps, there; soft bodies may come to press on anything, and bodies that are
-        # carried are let go between two steps.
-        carried = run.keyframes.next_key(-np.inf) < np.inf
-        self._goes_on = not (run.plan.observe or run.plan.includes("event kernel") or run.soft_bodies.moves or carried)
+        # Others look at the run between two steps, or take its steps, there; soft bodies may come to press on anything.
+        self._goes_on = not (run.plan.observe or run.plan.includes("event kernel") or run.soft_bodies.moves)
         self._record = Record(
             Loop(
                 settings, world.compiled_shapes, pair_bodies(world), world.margins, world.coefficients, world.rolling, self._elsewhere,

@@ -12,9 +12,7 @@ whose members are all asleep stands still until something touches it.
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -49,14 +47,16 @@ from rigidimpulse.engine.regime import (
 )
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.sleeping import advance_sleep_timers
+from rigidimpulse.engine.substepped.calm_step import KEEPS_CHEAP, KEEPS_LARGE, KEEPS_TOUCHING, Choice, Landing, is_calm
+from rigidimpulse.engine.substepped.calm_steps import CalmSteps
 from rigidimpulse.engine.substepped.contact_forces import COARSE, FINE, FINEST, ContactStepper, Fineness, Outcome
 from rigidimpulse.engine.substepped.hand_over import HandOver
-from rigidimpulse.engine.substepped.island_step import energies_of_islands
 from rigidimpulse.engine.substepped.jointed import JointedStepper
+from rigidimpulse.engine.substepped.member_paths import MemberPaths
 from rigidimpulse.engine.substepped.membership import Candidates, connect_members, gather_members, settle_islands
 from rigidimpulse.engine.substepped.sharing import Sharing
-from rigidimpulse.engine.substepped.trajectories import depart, end_trajectories, let_fly, mark_slow, most_stray
-from rigidimpulse.engine.substepped.waypoints import Flown, Way, part_of, way_of, write_frames
+from rigidimpulse.engine.substepped.trajectories import depart, let_fly, mark_slow
+from rigidimpulse.engine.substepped.waypoints import way_of
 from rigidimpulse.engine.warm_up import prepare_kernels
 from rigidimpulse.model.contact_memory import held_pairs, rebounded_pairs
 from rigidimpulse.model.island import Island, island_without_contacts
@@ -70,25 +70,9 @@ REST = 3.0
 """For how long members must have hardly moved to be sleepy, in sqrt(r / g), see `sleeping.py`."""
 LEAVING = 0.1
 """Part of its speed at which a fast body must leave an island that it has hit to be no part of it."""
-MOST_PIECES = 4
-"""Parts of what is stepped at once, between which trajectories begin again."""
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the island that comes near it."""
 
-NONE = np.zeros(0, np.int64)
-
-
-class _Began(NamedTuple):
-    """The step that an island is in."""
-
-    time: float  # s, of its start
-    end: float  # s
-    energy: float  # J, at its start
-    taken: float  # J that the balance of energy takes off until its end
-    raised: float  # J that bodies gain until then by rising out of each other, and cannot pay
-    given: float  # J that drives and moving supports give by joints and the contacts beside them
-    joints: np.ndarray  # of the members
-    way: Way | None  # if frames fall into it
 
 
 class SubsteppedIslands:
@@ -114,12 +98,11 @@ class SubsteppedIslands:
         self._sharing, self._rest = sharing, rest
         solver = world.accuracy.contact_solver
         self._world, self._movable = world, world.dynamic.copy()
-        self._finer = solver in ("auto", "substepped") and not is_crowd(world)
-        self._parts = COARSE if not self._finer else FINEST if solver == "auto" and only_expensive(world) else FINE
+        finer = solver in ("auto", "substepped") and not is_crowd(world)
+        self._parts = COARSE if not finer else FINEST if solver == "auto" and only_expensive(world) else FINE
         self.label = np.full(world.num_bodies, -1, np.int64)
         self.sleep_timer = np.zeros(world.num_bodies)
         self.asleep = np.zeros(world.num_bodies, bool)
-        self._energies = np.zeros((4, world.num_bodies))
         self._root, self._touches = np.zeros(world.num_bodies, np.int64), np.zeros(world.num_bodies, bool)
         self._stood = np.full((world.num_bodies, 7), np.inf)
         self._taken = np.zeros(world.num_bodies, bool)
@@ -127,8 +110,7 @@ class SubsteppedIslands:
         self._jointed = jointed(world)
         self.hand_over = HandOver(world, self._jointed, CheapestRegime(self._jointed) if solver == "cheapest" else None)
         self._joint_stepper: JointedStepper | None = None
-        self._ends: dict[int, float] = {}
-        self._began: dict[int, _Began] = {}
+        self._paths = MemberPaths(world, self.label)
         self._outcomes: list[tuple[Outcome, float]] = []
         self._outcome_begin = 0.0
         self._most = self._steps = 0
@@ -182,15 +164,48 @@ class SubsteppedIslands:
         """Whether islands of bodies that no impulse keeps apart are handed over, see `HandOver.may_take`."""
         return self.hand_over.may_take(bodies)
 
+    def _tally(self) -> tuple[int, int]:
+        """Steps that were taken, and members of the largest of them."""
+        calm = self.__dict__.get("_calm")
+        return (self._steps, self._most) if calm is None else (self._steps + calm.steps, max(self._most, calm.most))
+
     def summary(self) -> str:
         """What became of sub-stepped islands in the run."""
         refused = ", ".join(f"{reason} ({count})" for reason, count in sorted(self._refused.items()))
-        text = f"{self._steps} steps, largest {self._most} bodies" if self._steps else "none"
+        steps, most = self._tally()
+        text = f"{steps} steps, largest {most} bodies" if steps else "none"
         if times := self.hand_over.times_handed_over():
             text += f", {times} times handed over by the exact regime in the middle of a step"
         if self._joint_stepper is not None:
             text += f", {self._joint_stepper.halved} sub-steps halved so that joints close"
         return f"{text}; left to the exact regime, islands times steps: {refused}" if refused else text
+
+    @cached_property
+    def _calm(self) -> CalmSteps:
+        """Takes steps in which nothing else moves."""
+        world, cheapest, n = self._world, self.hand_over.cheapest, self._world.num_bodies
+        rule = KEEPS_LARGE if self._auto else KEEPS_TOUCHING if cheapest is None else KEEPS_CHEAP
+        choice = Choice(
+            rule, self._limits, self._rest, self.counts, (cheapest or CheapestRegime(self._jointed)).costs, self._taken,
+            np.zeros(n, bool), self._root, self._touches, np.zeros((0, 2), np.int64), np.zeros(n, bool),
+        )  # fmt: skip
+        landing = Landing(
+            world.constants, self.stepper.pressed, self.label, np.zeros((4, n)), self._stood, self.sleep_timer, self.stepper.inner,
+            self.stepper.skin,
+        )  # fmt: skip
+        return CalmSteps(self.stepper, self._paths, self._candidates, choice, landing)
+
+    def take_calm_steps(self, run: Run, end: float, until: float) -> PairEvents | None:
+        """Take steps, the first one to `end` [s], as far as `until` [s], as long as nothing but members moves, see `calm_steps`.
+
+        Returns the pairs of a step that has begun and that the loop must finish; else None.
+        """
+        # Nobody looks at the run between such steps, and members without joints are asked for.
+        watched = run.plan.observe or run.soft_bodies.moves or self._jointed.any()
+        if watched or not is_calm(run.state.trajectory, self._world.constants):
+            return None
+        with run.plan.clock(NAME):
+            return self._calm.take(run, end, until)
 
     def choose(self, run: Run, pair_events: PairEvents) -> None:
         """Choose the islands of the step: `pair_events.inside` marks their bodies, `pair_events.asleep` the sleepers."""
@@ -199,7 +214,8 @@ class SubsteppedIslands:
             return
         world, trajectory, time = run.world, run.state.trajectory, pair_events.begin
         ended = trajectory.mode == LINEAR
-        self._end_trajectories(run, np.flatnonzero(ended), time)
+        # Those that calm steps could not go on with have arrived.
+        self._paths.arrive(run, np.flatnonzero(ended), time)
         chosen = self._choose(run, pair_events, solve_count) if pair_events.end > time else np.zeros_like(ended)
         # Members that are in no island any more fly freely.
         left = np.flatnonzero(ended & ~chosen & (trajectory.mode == LINEAR))
@@ -314,65 +330,23 @@ class SubsteppedIslands:
             for r in np.unique(root[chosen & self._jointed]).tolist():
                 driven[r] = self._is_driven(run, np.flatnonzero(chosen & (root == r)))
         sleeps = settle_islands(run.state.now, self._candidates, near, links, chosen, root, driven, self._rest)
-        self._put_to_sleep(run, np.flatnonzero(sleeps & (run.state.trajectory.mode != FIXED)) if len(sleeps) else NONE, time)
+        if len(sleeps):
+            self._paths.put_to_sleep(run, self.stepper, np.flatnonzero(sleeps & (run.state.trajectory.mode != FIXED)), time)
 
     def _is_driven(self, run: Run, members: np.ndarray) -> bool:
         """Whether joints of members hang from something that moves, or will let go."""
         which = run.joints.at(members[self._jointed[members]])
         return bool(len(which)) and (bool(run.world.moving[run.joints.bodies_of(which)].any()) or run.joints.will_let_go(which))
 
-    def _put_to_sleep(self, run: Run, members: np.ndarray, time: float) -> None:
-        """Let members stay where they are."""
-        world, trajectory, now = run.world, run.state.trajectory, run.state.now
-        if not len(members):
-            return
-        before = mechanical_energy(now, world.constants, members)
-        run.recorder.flush_all(trajectory, members, time)
-        now.velocity[members] = now.angular_velocity[members] = 0.0
-        trajectory.mode[members], trajectory.start[members] = FIXED, time
-        trajectory.velocity[members] = trajectory.angular_velocity[members] = 0.0
-        self.stepper.report_crossed(run, members, time)
-        run.log.account(time, "sub-stepping", mechanical_energy(now, world.constants, members) - before)
-
-    def _end_trajectories(self, run: Run, members: np.ndarray, time: float) -> None:
-        """Bring members to `time`, the end of their trajectories; account for what the step took of their energy."""
-        if not len(members):
-            return
-        state, world = run.state, run.world
-        labels = sorted(set(self.label[members].tolist()))
-        for label in labels:
-            if label in self._began and (way := self._began[label].way) is not None:
-                write_frames(run.recorder, way, time, Flown(world.inertia[way.bodies], world.steady_acceleration[way.bodies]))
-        run.recorder.flush_all(state.trajectory, members, time)
-        end_trajectories(
-            state.trajectory, members, time, world.steady_acceleration, state.now, state.rotation, run.acceleration,
-            run.angular_acceleration,
-        )  # fmt: skip
-        energies_of_islands(state.now, world.constants, members, self.label, np.zeros((3, len(members))), self._energies)
-        for label in labels:
-            if label in self._began:
-                self._account(run, self._began.pop(label), float(self._energies[0, label]), time)
-
-    def _account(self, run: Run, began: _Began, energy: float, time: float) -> None:
-        """Account for a step that ends at `time` with an energy, J."""
-        change = energy - began.energy
-        # Trajectories that end early have had their share of it.
-        share = (time - began.time) / (began.end - began.time)
-        run.log.account_over(began.time, time, "energy correction", -began.taken * share)
-        run.log.account_over(began.time, time, "position correction", began.raised * share)
-        run.log.account_over(began.time, time, "joints", began.given * share)
-        run.log.account_over(began.time, time, "sub-stepping", change - (began.raised - began.taken + began.given) * share)
-        if len(began.joints) and time > began.time:
-            run.joints.account_sub_steps(began.joints, began.time, time)
-
     def finish(self, run: Run) -> None:
         """Account for the energy of sub-steps that last until the end of the run, and tell the plan what was done."""
         refused = {f"refused: {reason}": count for reason, count in self._refused.items()}
-        run.plan.tell(NAME, self.summary(), {"steps": self._steps, "largest island": self._most, **refused})
+        steps, most = self._tally()
+        run.plan.tell(NAME, self.summary(), {"steps": steps, "largest island": most, **refused})
         members, time = np.flatnonzero(run.state.trajectory.mode == LINEAR), run.state.time
         if not len(members):
             return
-        self._end_trajectories(run, members, time)
+        self._paths.end(run, members, time)
         self.stepper.report_crossed(run, members, time)
         let_fly(run.state.trajectory, members, run.world.steady_acceleration)
 
@@ -414,14 +388,14 @@ class SubsteppedIslands:
 
     def _due(self, pair_events: PairEvents, time: float) -> np.ndarray:
         """Members whose trajectories end at `time`."""
-        due = [label for label, end in self._ends.items() if end <= time]
+        due = [label for label, end in self._paths.ends.items() if end <= time]
         return np.flatnonzero(pair_events.inside & np.isin(self.label, due)) if due else np.zeros(0, np.int64)
 
     def _bring_in(self, run: Run, island: Island, members: np.ndarray) -> None:
         """Let the members be advanced with an island; bring them to its time. (Those that it does not touch are no members of it.)"""
         state, time = run.state, island.time
         stepped = state.trajectory.mode[members] == LINEAR
-        self._end_trajectories(run, members[stepped & (state.trajectory.start[members] < time)], time)
+        self._paths.end(run, members[stepped & (state.trajectory.start[members] < time)], time)
         away = members[~(stepped | self.asleep[members])]
         if len(away) and len(away := np.setdiff1d(away, island.members)):
             bring_all(state.trajectory, away, time, state.now, state.rotation, run.acceleration, run.angular_acceleration)
@@ -540,12 +514,7 @@ class SubsteppedIslands:
         way = None
         if out.waypoints is not None:
             way = way_of(out, out.waypoints, run.state.now, (time, end), len(which) > 0 and self._flies(run, which))
-        energies_of_islands(run.state.now, run.world.constants, out.members, self.label, out.energies, self._energies)
-        for label in sorted(set(self.label[members].tolist())):
-            part = None if way is None else part_of(way, members[self.label[members] == label])
-            self._ends[label] = end
-            energy, taken, raised, given = self._energies[:, label].tolist()
-            self._began[label] = _Began(time, end, energy, taken, raised, given, which, part)
+        self._paths.begin(run, out, span, which, way)
         return out
 
     def _flies(self, run: Run, which: np.ndarray) -> bool:
@@ -582,17 +551,12 @@ class SubsteppedIslands:
         So they do where others may meet members in the step: what meets a body that turns, in the middle of its straight way, meets it
         elsewhere than it is.
         """
-        stepper, step, straight = self.stepper, self.stepper.step_length, self.stepper.straight
-        joints = run.joints.at(members[self._jointed[members]])
-        if (len(joints) or stepper.alone_length > step) and not pair_events.may_meet()[members].any():
-            step, straight = stepper.alone_length, np.inf
+        stepper, joints = self.stepper, run.joints.at(members[self._jointed[members]])
+        alone = (len(joints) > 0 or stepper.at_once_alone != stepper.at_once) and not pair_events.may_meet()[members].any()
+        at_once, straight = stepper.at_once_alone if alone else stepper.at_once
         if len(joints):
-            step = run.world.accuracy.step
-        stray = most_stray(run.state.now, members, stepper.pressed | self._finer, stepper.reach, stepper.skin, straight)
-        spans = max(math.ceil(step / stepper.span(members, step) - 1e-9), 1)
-        pieces = max(min(math.ceil(stray * step), MOST_PIECES * spans), spans)
-        left = max(math.ceil((pair_events.end - time) * pieces / step - 1e-6), 1)
-        end = pair_events.end if left == 1 else time + (pair_events.end - time) / left
+            at_once, straight = run.world.accuracy.step, np.inf if alone else straight
+        end = stepper.end_of(run.state.now, members, (at_once, straight), (time, pair_events.end))
         return min(end, run.joints.next_release(joints, time)) if len(joints) else end
 
     def _leaves(self, run: Run, island: Island) -> np.ndarray:

@@ -99,7 +99,9 @@ from rigidimpulse.engine.substepped.stages import (
     limits_of,
     work_on,
 )
+from rigidimpulse.engine.substepped.trajectories import Ends, end_of_piece
 from rigidimpulse.model.world import World
+from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.evaluate import refresh_pose
 from rigidimpulse.motion.trajectory import FIXED
 from rigidimpulse.motion.waypoints import Waypoints, grown_waypoints, make_waypoints, waypoints_of
@@ -112,8 +114,6 @@ LEAST_SUB_STEPS = 16
 UNLIKE, MOST_UNLIKE = 6.0, 96.0
 """How many times as heavy as a body one that it touches is, from which sub-steps go with the root of it, and to which: a light body bears a
 heavy one by impulses that sub-steps find bit by bit. A box under a ball of 25 times its mass was up to 5 skins inside the floor."""
-SPAN = 1.0
-"""Longest time that is stepped at once, in sqrt(r / g) of the smallest inner radius r."""
 CROSSED = TOLERANCES.sub_stepping.crossed
 MOST_LOOKS = 1024
 """Looks for contacts in what is stepped at once that speed may ask for. Beyond that an island would cost more than it advances: a light
@@ -135,15 +135,16 @@ class Parts(NamedTuple):
     sub_step: float  # of the longest sub-step
     motion: float  # of `substep_motion`, until touching bodies are looked at again
     straight: float  # of `substep_motion`, skins by which trajectories may stray from the ways of turning bodies
+    all_stray: bool  # whether that is asked of all bodies that turn, and not of those alone that contacts acted on
 
 
-COARSE = Parts(1.0, 1.0, 1.0, 1.0, 10.0)
+COARSE = Parts(1.0, 1.0, 1.0, 1.0, 10.0, all_stray=False)
 """For crowds."""
-FINE = Parts(1.0 / 2.0, 1.0 / 2.0, 1.0 / 8.0, 1.0 / 2.0, 5.0)
+FINE = Parts(1.0 / 2.0, 1.0 / 2.0, 1.0 / 8.0, 1.0 / 2.0, 5.0, all_stray=True)
 """For scenes that are no crowd (`regime.CROWD`): no body is deeper in another than the skin in thirty scenes of 12 to 60 bodies, where in
 nine of them one was, up to 13 skins (`tests/bench/both_regimes.py`). A whole step at once is too long: where a heavy body hits a light one
 that stands, sub-steps become shorter when the next ones begin (see UNLIKE)."""
-FINEST = Parts(1.0 / 8.0, 1.0, 1.0 / 32.0, 1.0 / 2.0, 1.0)
+FINEST = Parts(1.0 / 8.0, 1.0, 1.0 / 32.0, 1.0 / 2.0, 1.0, all_stray=True)
 """For islands of scenes of few bodies that stand in for exact ones: a row of dominoes keeps its energy to 1e-7 of it. Stepped twice as far
 at once, as finely, it gains up to 1e-2 of a domino's from what hits it in the middle, where its ways are straight."""
 
@@ -205,8 +206,9 @@ class ContactStepper:
         step_length, alone_length: s, that is stepped at once at most, and where nothing else may meet what is stepped.
         motion: inner radii, see `Accuracy.substep_motion`.
         kept: inner radii that a pair may come past each other with the contacts it has, in the middle of a step.
-        straight: skins by which trajectories may stray from the ways of turning bodies.
-        bodies: by rank. table: pairs and contact points. balance: of their energy.
+        at_once, at_once_alone: the same with the skins by which trajectories may stray from the ways of turning bodies.
+        bodies: by rank. table: pairs and contact points. balance: of their energy. island: what kernels need of the bodies.
+        around: what does not change of them, and who takes part.
         pressed: (n,) bool, contacts acted on the body when it was last stepped.
 
     """
@@ -263,7 +265,10 @@ class ContactStepper:
         self.motion = world.accuracy.substep_motion * parts.motion
         # Where a step is cut into pieces, what is new is known when the next one begins.
         self._motion_of_new = self.motion if parts.alone > parts.step else np.inf
-        self.straight = world.accuracy.substep_motion * parts.straight
+        straight = world.accuracy.substep_motion * parts.straight
+        self.at_once = self.step_length, straight
+        self.at_once_alone = (self.alone_length, np.inf) if self.alone_length > self.step_length else self.at_once
+        self._ends = Ends(self.inner, world.steady_strength, self.reach, self.skin, parts.all_stray)
         self.kept = KEPT * self.motion
         # Balls and moving supports: all contacts are found again in the middle of a step.
         self._all_quick = bool(world.moving.any() or world.ball.any())
@@ -271,9 +276,9 @@ class ContactStepper:
         self.pressed = np.zeros(n, bool)
         self._places, self._margins = np.zeros(0, np.int64), np.zeros(0)
         self.members, self._progress = np.zeros(0, np.int64), np.zeros(COLUMNS, np.int64)
-        self._around = Surroundings(bounds, self.fat_boxes.fat, world.inv_mass, world.steady_strength, self._part)
+        self.around = Surroundings(bounds, self.fat_boxes.fat, world.inv_mass, world.steady_strength, self._part)
         self._demands = np.zeros(DEMANDS)
-        self._island = Island(
+        self.island = Island(
             self._convex, self.bodies, self.balance, self._weights, self.order, self._cornered, world.coefficients
         )
         self._step = Step(
@@ -320,12 +325,18 @@ class ContactStepper:
             pieces = max(math.ceil(step / h), pieces)
         return step / pieces
 
-    def span(self, members: np.ndarray, step: float) -> float:
-        """Longest time of a step [s] that members are stepped at once, s: bodies may fall by half an inner radius in it."""
-        strength = float(self.world.steady_strength[members].max())
-        return min(step, SPAN * math.sqrt(float(self.inner[members].min()) / strength)) if strength > 0.0 else step
+    def end_of(self, now: BodyState, members: np.ndarray, at_once: tuple[float, float], span: tuple[float, float]) -> float:
+        """When what members are stepped at once from the begin of a span [s] on ends, s: at the end of the span, or before.
 
-    def _renew_pairs(self, run: Run, ahead: float) -> None:
+        at_once: s, that is stepped at once at most, and skins by which trajectories may stray from the ways of turning bodies.
+        """
+        return float(end_of_piece(now, members, self._ends, self.pressed, at_once, span))
+
+    def by_place(self, marked: np.ndarray) -> np.ndarray:
+        """Bodies that are marked (n,) bool, in their order."""
+        return self.order[marked[self.order]]
+
+    def renew_pairs(self, run: Run, ahead: float) -> None:
         """Find again the pairs of bodies that take part and may meet in `ahead` s."""
         self.table.replace(*self.fat_boxes.renewed(run.state.now, run.acceleration, self._part, ahead))
         classify(self.table.pairs, self.bodies, self.shapes)
@@ -338,7 +349,7 @@ class ContactStepper:
         part[self.world.dynamic & (run.state.trajectory.mode != FIXED)] = OUTSIDE
         part[member] = MEMBER
         while (near := self.fat_boxes.near(self.table.pairs, run.state.now, run.acceleration, part, ahead)) is None:
-            self._renew_pairs(run, ahead)
+            self.renew_pairs(run, ahead)
         return near
 
     def set_up(self, run: Run, members: np.ndarray, supports: np.ndarray, ahead: float) -> None:
@@ -360,8 +371,8 @@ class ContactStepper:
         self.members, part, demands = members, self._part, self._demands
         part[:] = OUTSIDE
         part[supports], part[members] = SUPPORT, MEMBER
-        while not load_island(self._island, self.table.pairs, self._around, run.motion, ahead, demands):
-            self._renew_pairs(run, ahead)
+        while not load_island(self.island, self.table.pairs, self.around, run.motion, ahead, demands):
+            self.renew_pairs(run, ahead)
         self.table.pack()
         strength, skin, ratio, motion, pieces, approach = demands.tolist()
         has_joints = fineness is not None
@@ -420,8 +431,8 @@ class ContactStepper:
     def _try_stages(self, last: int) -> int:
         """Go on as far as memory and one core go; returns why not farther."""
         if not self._has_general:
-            return go_on_with_polyhedra(self.simd, self._island, self._memory(), self._step, self._progress, last)
-        return go_on(self.simd, self._island, self._memory(), self._general(), self._step, self._progress, last)
+            return go_on_with_polyhedra(self.simd, self.island, self._memory(), self._step, self._progress, last)
+        return go_on(self.simd, self.island, self._memory(), self._general(), self._step, self._progress, last)
 
     def _memory(self) -> Memory:
         """The arrays as they are now; the same tuple as long as they are the same, as in `ContactTable.arrays`."""
@@ -474,7 +485,7 @@ class ContactStepper:
         else:
             self._work_queue[:] = empty_work_queue()
             self._sharing.call(work_on, [
-                (self.simd, self._island, self._memory(), self._step, self._progress, share, self._sharing.solvers)
+                (self.simd, self.island, self._memory(), self._step, self._progress, share, self._sharing.solvers)
                 for share in range(min(self._shares, self._sharing.solvers))
             ])  # fmt: skip
             self._progress[STAGE] = KEEP
@@ -531,7 +542,7 @@ class ContactStepper:
         while True:
             memory = self._memory()._replace(places=places, margins=margins)
             general = self._general()._replace(asked=asked, contacts=buffer.contacts)
-            how = go_on(self.simd, self._island, memory, general, self._step, progress, PLAN)
+            how = go_on(self.simd, self.island, memory, general, self._step, progress, PLAN)
             if how == AT_STAGE:
                 return
             self._make_space(how, int(progress[NEEDED]))
@@ -613,12 +624,16 @@ class ContactStepper:
 
     def step(self, run: Run, begin: float, end: float) -> Outcome:
         """Step what was loaded from `begin` to `end`, s."""
-        has_frames = self.begin_step(run, begin, end)
-        self._go_on(run, END)
-        out = self._outcome(self._waypoints if has_frames else None)
-        unload_pressed(self._island, *out.places, self.pressed)
+        out = self.advance(run, begin, end)
+        unload_pressed(self.island, *out.places, self.pressed)
         out.energies[GIVEN] = 0.0
         return out
+
+    def advance(self, run: Run, begin: float, end: float) -> Outcome:
+        """The same, where members are yet to be unloaded; space for where they are."""
+        has_frames = self.begin_step(run, begin, end)
+        self._go_on(run, END)
+        return self._outcome(self._waypoints if has_frames else None)
 
     def step_by(self, run: Run, solve: Callable[[int, float], None]) -> None:
         """Step what was set up, and begun, with another solver; solve: makes as many sub-steps of such a length, s, and waypoints."""
@@ -640,7 +655,7 @@ class ContactStepper:
     def end_step(self, waypoints: Waypoints | None) -> Outcome:
         """Balance the energy, and say where the members are; waypoints: of all bodies, by rank."""
         out = self._outcome(waypoints)
-        unload_island(self._island, *out.places)
+        unload_island(self.island, *out.places)
         return out
 
     def _outcome(self, waypoints: Waypoints | None) -> Outcome:

@@ -102,6 +102,15 @@ def unload_pressed(island, at, position, orientation, velocity, energies, presse
 
 
 @jit
+def add_mechanical_energies(now, constants, members, label, energy):
+    """Add the mechanical energies of the members (k,) to those of their islands, energy (n,) J by label (n,), -1 for bodies in none."""
+    for k in range(members.shape[0]):
+        i = label[members[k]]
+        if i >= 0:
+            energy[i] += mechanical_energy(now, constants, members[k : k + 1])
+
+
+@jit
 def energies_of_islands(now, constants, members, label, energies, out):
     """Write the mechanical energy of the members (k,) of each island, and the sums of their `energies` (3, k), to out (4, n), by its label.
 
@@ -110,10 +119,10 @@ def energies_of_islands(now, constants, members, label, energies, out):
     for i in range(out.shape[1]):
         for row in range(4):
             out[row, i] = 0.0
+    add_mechanical_energies(now, constants, members, label, out[0])
     for k in range(members.shape[0]):
         i = label[members[k]]
         if i >= 0:
-            out[0, i] += mechanical_energy(now, constants, members[k : k + 1])
             for row in range(3):
                 out[1 + row, i] += energies[row, k]
 

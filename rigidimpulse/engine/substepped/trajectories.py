@@ -1,5 +1,7 @@
 """Trajectories of the members of sub-stepped islands: how they end and begin (kernels)."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rigidimpulse.core.kernels import inlined, jit
@@ -9,6 +11,10 @@ from rigidimpulse.motion.trajectory import FREE, LENGTH, LINEAR, SPEEDS, begin, 
 
 TURN = 2.5
 """Angle by which a body may turn in one trajectory, rad."""
+SPAN = 1.0
+"""Longest time that is stepped at once, in sqrt(r / g) of the smallest inner radius r."""
+MOST_PIECES = 4
+"""Parts of what is stepped at once, between which trajectories begin again."""
 EVEN = TOLERANCES.sub_stepping.even_path
 
 
@@ -69,8 +75,18 @@ def mark_slow(bodies, inner, limits, member):
         member[i] = member[i] and is_slow(bodies, i, inner[i], limits)
 
 
+class Ends(NamedTuple):
+    """What says when trajectories of n bodies end."""
+
+    inner: np.ndarray  # (n,) m
+    strength: np.ndarray  # (n,) m/s2, of what pulls them
+    reach: np.ndarray  # (n,) m
+    skin: np.ndarray  # (n,) m
+    all_stray: bool  # whether contacts are taken to act on all
+
+
 @jit
-def most_stray(bodies, members, pressed, reach, skin, allowed):
+def most_stray(bodies, members, ends, pressed, allowed):
     """Largest w / TURN of the members, and w sqrt(r / (8 d)) of those that contacts act on, 1/s; d: `allowed` skins.
 
     The centre of a body that rolls over a point at r strays by d = r (w h)^2 / 8 from its straight way in h s.
@@ -81,9 +97,30 @@ def most_stray(bodies, members, pressed, reach, skin, allowed):
         for c in range(3):
             spin += bodies.angular_velocity[i, c] ** 2
         most = max(most, np.sqrt(spin) / TURN)
-        if pressed[i]:
-            most = max(most, np.sqrt(spin * reach[i] / (8.0 * allowed * skin[i])))
+        if pressed[i] or ends.all_stray:
+            most = max(most, np.sqrt(spin * ends.reach[i] / (8.0 * allowed * ends.skin[i])))
     return most
+
+
+@jit
+def end_of_piece(bodies, members, ends, pressed, at_once, span):
+    """When trajectories of members that begin at span[0] end, s: at span[1], or before it if members are tiny or spin fast.
+
+    ends: `Ends`; pressed: (n,) bool, bodies that contacts act on. at_once: s, that is stepped at once at most, and skins by which
+    trajectories may stray from the ways of turning bodies. In what is stepped at once bodies may fall by half an inner radius.
+    """
+    step, allowed = at_once
+    time, end = span
+    strength, inner, spans = 0.0, np.inf, 1.0
+    for i in members:
+        strength, inner = max(strength, ends.strength[i]), min(inner, ends.inner[i])
+    if strength > 0.0:
+        spans = max(np.ceil(step / min(step, SPAN * np.sqrt(inner / strength)) - 1e-9), 1.0)
+    wanted, most = np.ceil(most_stray(bodies, members, ends, pressed, allowed) * step), MOST_PIECES * spans
+    # Spins may be no numbers: the end of the step finds them.
+    pieces = max(wanted if wanted < most else most, spans)
+    left = max(np.ceil((end - time) * pieces / step - 1e-6), 1.0)
+    return end if left == 1.0 else time + (end - time) / left
 
 
 @jit
