@@ -136,7 +136,7 @@ class NoSubstepping:
         """All islands are exact."""
         return islands
 
-    def take_calm_steps(self, _run: Any, _end: float, _until: float) -> None:
+    def take_undisturbed_steps(self, _run: Any, _end: float, _until: float) -> None:
         """No step is taken: there are no members."""
 
     def may_take(self, _bodies: np.ndarray) -> bool:

@@ -2,7 +2,7 @@
 
 The kernel of balls (`spheres/`) takes many steps at once, as long as only simple impacts of balls happen in them. So does the compiled
 order of events (`exact/event_loop.py`), as long as they need nothing but exact contact and nobody watches the run, and so do sub-stepped
-islands (`substepped/calm_steps.py`) as long as nothing else moves.
+islands (`substepped/undisturbed_steps.py`) as long as nothing else moves.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def run_steps(run: Run, end: float, progress: Callable[[float], None] | None, ev
 def take_steps(run: Run, end: float, until: float) -> None:
     """Step to `end` [s], or by whole steps as far as `until` [s] where they need nothing but exact contact, or nothing but sub-steps."""
     begin = run.state.time
-    left = run.substepped.take_calm_steps(run, end, until)
+    left = run.substepped.take_undisturbed_steps(run, end, until)
     if left is not None:
         finish_step(run, left, until)
     elif run.state.time == begin:

@@ -261,7 +261,7 @@ class Substepping(Protocol):
         """How often the exact regime deals with the bodies."""
         ...
 
-    def take_calm_steps(self, run: Any, end: float, until: float, /) -> Any:
+    def take_undisturbed_steps(self, run: Any, end: float, until: float, /) -> Any:
         """Take steps as long as nothing moves but members; returns the pairs of a step that the loop must finish, else None."""
         ...
 

@@ -49,7 +49,6 @@ from rigidimpulse.engine.run import Run, start_trajectories
 from rigidimpulse.engine.sleeping import advance_sleep_timers, stands_still
 from rigidimpulse.engine.spheres.run import EventRun
 from rigidimpulse.engine.step import step
-from rigidimpulse.engine.substepped.calm_step import KEEPS_CHEAP, Choice, Landing, begin_calm_step, is_calm, land_members
 from rigidimpulse.engine.substepped.contact_forces import COARSE, ContactStepper
 from rigidimpulse.engine.substepped.island_step import energies_of_islands
 from rigidimpulse.engine.substepped.jointed import JointedStepper
@@ -57,6 +56,14 @@ from rigidimpulse.engine.substepped.member_paths import MemberPaths
 from rigidimpulse.engine.substepped.membership import Candidates, connect_members, gather_members, settle_islands
 from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.trajectories import depart, let_fly, mark_slow
+from rigidimpulse.engine.substepped.undisturbed_step import (
+    KEEPS_CHEAP,
+    Choice,
+    Landing,
+    begin_undisturbed_step,
+    is_undisturbed,
+    land_members,
+)
 from rigidimpulse.engine.warm_up import (
     ANY_SHAPES,
     CONTACTS,
@@ -231,7 +238,7 @@ def _stand_beside_sub_steps(run: Run) -> None:
     candidates = Candidates(
         world.dynamic, world.moving, ~member, world.mass, stepper.inner, steady, world.steady_strength, label, none, ~member
     )
-    _take_calm_step(run, stepper, candidates)
+    _take_undisturbed_step(run, stepper, candidates)
     gather_members(run.motion, candidates, 0.0, (1.0, 1.0), member)
     connect_members(near, links, member, root, ~member)
     settle_islands(state.now, candidates, near, links, member, root, ~member, 1.0)
@@ -249,7 +256,7 @@ def _stand_beside_sub_steps(run: Run) -> None:
     advance_sleep_timers(members, poses, of_sleep, STEP, np.zeros((2, 7)), np.zeros(2))
 
 
-def _take_calm_step(run: Run, stepper: ContactStepper, candidates: Candidates) -> None:
+def _take_undisturbed_step(run: Run, stepper: ContactStepper, candidates: Candidates) -> None:
     """What a step calls in which nothing moves but members, beside its sub-steps."""
     world, state, n, member = run.world, run.state, run.world.num_bodies, np.array([False, True])
     choice = Choice(
@@ -259,9 +266,9 @@ def _take_calm_step(run: Run, stepper: ContactStepper, candidates: Candidates) -
     landing = Landing(
         world.constants, stepper.pressed, candidates.label, np.zeros((4, n)), np.zeros((n, 7)), np.zeros(n), stepper.inner, stepper.skin,
     )  # fmt: skip
-    is_calm(state.trajectory, world.constants)
+    is_undisturbed(state.trajectory, world.constants)
     pairs = stepper.table.pairs
-    begin_calm_step(choice, candidates, stepper.around, run.motion, pairs, stepper.fat_boxes.space_for(pairs), (0.0, STEP))
+    begin_undisturbed_step(choice, candidates, stepper.around, run.motion, pairs, stepper.fat_boxes.space_for(pairs), (0.0, STEP))
     stepper.load(run, np.array([1]), np.array([0]), STEP)
     places = np.array([stepper.rank[1]]), np.zeros((1, 3)), np.zeros((1, 4)), np.zeros((1, 6)), np.zeros((3, 1))
     recorded = run.recorder.frames, run.recorder.written

@@ -47,8 +47,6 @@ from rigidimpulse.engine.regime import (
 )
 from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.sleeping import advance_sleep_timers
-from rigidimpulse.engine.substepped.calm_step import KEEPS_CHEAP, KEEPS_LARGE, KEEPS_TOUCHING, Choice, Landing, is_calm
-from rigidimpulse.engine.substepped.calm_steps import CalmSteps
 from rigidimpulse.engine.substepped.contact_forces import COARSE, FINE, FINEST, ContactStepper, Fineness, Outcome
 from rigidimpulse.engine.substepped.hand_over import HandOver
 from rigidimpulse.engine.substepped.jointed import JointedStepper
@@ -56,6 +54,8 @@ from rigidimpulse.engine.substepped.member_paths import MemberPaths
 from rigidimpulse.engine.substepped.membership import Candidates, connect_members, gather_members, settle_islands
 from rigidimpulse.engine.substepped.sharing import Sharing
 from rigidimpulse.engine.substepped.trajectories import depart, let_fly, mark_slow
+from rigidimpulse.engine.substepped.undisturbed_step import KEEPS_CHEAP, KEEPS_LARGE, KEEPS_TOUCHING, Choice, Landing, is_undisturbed
+from rigidimpulse.engine.substepped.undisturbed_steps import UndisturbedSteps
 from rigidimpulse.engine.substepped.waypoints import way_of
 from rigidimpulse.engine.warm_up import prepare_kernels
 from rigidimpulse.model.contact_memory import held_pairs, rebounded_pairs
@@ -166,8 +166,8 @@ class SubsteppedIslands:
 
     def _tally(self) -> tuple[int, int]:
         """Steps that were taken, and members of the largest of them."""
-        calm = self.__dict__.get("_calm")
-        return (self._steps, self._most) if calm is None else (self._steps + calm.steps, max(self._most, calm.most))
+        others = self.__dict__.get("_undisturbed")
+        return (self._steps, self._most) if others is None else (self._steps + others.steps, max(self._most, others.most))
 
     def summary(self) -> str:
         """What became of sub-stepped islands in the run."""
@@ -181,7 +181,7 @@ class SubsteppedIslands:
         return f"{text}; left to the exact regime, islands times steps: {refused}" if refused else text
 
     @cached_property
-    def _calm(self) -> CalmSteps:
+    def _undisturbed(self) -> UndisturbedSteps:
         """Takes steps in which nothing else moves."""
         world, cheapest, n = self._world, self.hand_over.cheapest, self._world.num_bodies
         rule = KEEPS_LARGE if self._auto else KEEPS_TOUCHING if cheapest is None else KEEPS_CHEAP
@@ -193,19 +193,19 @@ class SubsteppedIslands:
             world.constants, self.stepper.pressed, self.label, np.zeros((4, n)), self._stood, self.sleep_timer, self.stepper.inner,
             self.stepper.skin,
         )  # fmt: skip
-        return CalmSteps(self.stepper, self._paths, self._candidates, choice, landing)
+        return UndisturbedSteps(self.stepper, self._paths, self._candidates, choice, landing)
 
-    def take_calm_steps(self, run: Run, end: float, until: float) -> PairEvents | None:
-        """Take steps, the first one to `end` [s], as far as `until` [s], as long as nothing but members moves, see `calm_steps`.
+    def take_undisturbed_steps(self, run: Run, end: float, until: float) -> PairEvents | None:
+        """Take steps, the first one to `end` [s], as far as `until` [s], as long as nothing but members moves, see `undisturbed_steps`.
 
         Returns the pairs of a step that has begun and that the loop must finish; else None.
         """
         # Nobody looks at the run between such steps, and members without joints are asked for.
         watched = run.plan.observe or run.soft_bodies.moves or self._jointed.any()
-        if watched or not is_calm(run.state.trajectory, self._world.constants):
+        if watched or not is_undisturbed(run.state.trajectory, self._world.constants):
             return None
         with run.plan.clock(NAME):
-            return self._calm.take(run, end, until)
+            return self._undisturbed.take(run, end, until)
 
     def choose(self, run: Run, pair_events: PairEvents) -> None:
         """Choose the islands of the step: `pair_events.inside` marks their bodies, `pair_events.asleep` the sleepers."""
@@ -214,7 +214,7 @@ class SubsteppedIslands:
             return
         world, trajectory, time = run.world, run.state.trajectory, pair_events.begin
         ended = trajectory.mode == LINEAR
-        # Those that calm steps could not go on with have arrived.
+        # Those that undisturbed steps could not go on with have arrived.
         self._paths.arrive(run, np.flatnonzero(ended), time)
         chosen = self._choose(run, pair_events, solve_count) if pair_events.end > time else np.zeros_like(ended)
         # Members that are in no island any more fly freely.
@@ -403,27 +403,7 @@ class SubsteppedIslands:
         island.substepped = members
 
     def contact_forces(self, run: Run, pair_events: PairEvents, island: Island) -> None:
-        """Step an island from its time to the end of the step, with what touches it and is slow."""
-        self._contact_forces(run, pair_events, island)
-        # Where all bodies are stepped, nothing can happen before the next trajectories begin: the loop is not asked.
-        while self._outcomes and self._outcomes[0][1] < pair_events.end and self._has_all(run, pair_events, island):
-            end = self._outcomes[0][1]
-            self.begin_trajectories(run, pair_events)
-            members = self._due(pair_events, end)
-            pair_events.wake[members] = np.inf
-            island = _bare_island(end)
-            self._bring_in(run, island, members)
-            self._contact_forces(run, pair_events, island)
-
-    def _has_all(self, run: Run, pair_events: PairEvents, island: Island) -> bool:
-        """Whether all movable bodies are stepped together with an island, and have no joints, which the loop would close and stop."""
-        assert island.substepped is not None
-        if self._jointed.any():
-            return False
-        return len(island.substepped) == int(run.world.dynamic.sum()) == int(pair_events.inside.sum())
-
-    def _contact_forces(self, run: Run, pair_events: PairEvents, island: Island) -> None:
-        """Step an island from its time until its trajectories must begin again."""
+        """Step an island, with what touches it and is slow, to the end of the step, or until its trajectories must begin again."""
         world, members = run.world, island.substepped
         assert members is not None
         run.contact_log.close(np.union1d(island.members, members) if len(island.members) else members, island.time)

@@ -34,7 +34,7 @@ class _Began(NamedTuple):
     raised: float  # J that bodies gain until then by rising out of each other, and cannot pay
     given: float  # J that drives and moving supports give by joints and the contacts beside them
     joints: np.ndarray  # of the members
-    way: Way | None  # if frames fall into it
+    way: Way | None  # of all that were stepped together, if frames fall into it
 
 
 @jit
@@ -82,10 +82,9 @@ class MemberPaths:
     ) -> None:
         """The same where the energies (4, n) J of the islands of members are known, see `energies_of_islands`."""
         for label in self.labels_of(members):
-            part = None if way is None else part_of(way, members[self._label[members] == label])
             self.ends[label] = span[1]
             energy, taken, raised, given = energies[:, label].tolist()
-            self._began[label] = _Began(*span, energy, taken, raised, given, joints, part)
+            self._began[label] = _Began(*span, energy, taken, raised, given, joints, way)
 
     def arrive(self, run: Run, members: np.ndarray, time: float) -> None:
         """Bring members to the begin of a step, unless that was done."""
@@ -98,8 +97,11 @@ class MemberPaths:
         if not len(members):
             return
         world, labels = self._world, self.labels_of(members)
-        for label in labels:
-            if label in self._began and (way := self._began[label].way) is not None:
+        ways = {id(began.way): began.way for label in labels if (began := self._began.get(label)) is not None}
+        for whole in ways.values():
+            if whole is not None:
+                # An island that something hits ends before others that were stepped with it.
+                way = part_of(whole, members)
                 write_frames(run.recorder, way, time, Flown(world.inertia[way.bodies], world.steady_acceleration[way.bodies]))
         _end_paths(run.motion, world.constants, members, time, run.recorder.frames, run.recorder.written, self._label, self._energy)
         for label in labels:

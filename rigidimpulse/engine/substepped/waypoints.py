@@ -77,6 +77,8 @@ def write_frames(recorder: Recorder, way: Way, until: float, flown: Flown) -> No
     frames, trajectories, everyone = Recorder(recorder.times[first:last], k), make_trajectories(k), np.arange(k)
     for leg in range(len(way.time) - 1):
         begin, end = way.time[leg : leg + 2].tolist()
+        if int(frames.written[0]) == int(np.searchsorted(frames.times, end)):
+            continue
         position, orientation, velocity, angular_velocity = _columns(way.state[leg])
         now = BodyState(position, orientation, velocity, angular_velocity, np.zeros(k), np.zeros((k, 3, 3)))
         position, orientation, velocity, angular_velocity = _columns(way.state[leg + 1])

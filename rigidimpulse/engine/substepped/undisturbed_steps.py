@@ -3,7 +3,7 @@
 The order of a step (`engine/step.py`) is made for events: it asks which pairs meet, and when. Where all that moves is stepped together,
 without joints, on what stands still, and no island begins or ends to be sub-stepped, nothing can meet anything outside. Such a step is
 
-    the trajectories end, the members are chosen (`begin_calm_step`)
+    the trajectories end, the members are chosen (`begin_undisturbed_step`)
     pieces, one after the other: load, sub-steps (`ContactStepper`), new trajectories (`land_members`)
 
 in a few calls of kernels, with the bits of the other order. It took five times as long for a row of dominoes. Bodies that rest elsewhere
@@ -17,15 +17,23 @@ import numpy as np
 from rigidimpulse.engine.exact.step_begin import GRID, step_end
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
-from rigidimpulse.engine.substepped.calm_step import CALM, NO_PAIRS, Choice, Landing, begin_calm_step, is_calm, land_members
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper
 from rigidimpulse.engine.substepped.member_paths import NO_JOINTS, MemberPaths
 from rigidimpulse.engine.substepped.membership import Candidates
+from rigidimpulse.engine.substepped.undisturbed_step import (
+    BEGUN,
+    NO_PAIRS,
+    Choice,
+    Landing,
+    begin_undisturbed_step,
+    is_undisturbed,
+    land_members,
+)
 from rigidimpulse.engine.substepped.waypoints import way_of
 from rigidimpulse.motion.trajectory import FIXED, LINEAR
 
 
-class CalmSteps:
+class UndisturbedSteps:
     """Takes such steps.
 
     Attributes:
@@ -44,7 +52,7 @@ class CalmSteps:
 
         Returns the pairs of a step that has begun and that the loop must finish; else None.
         """
-        while is_calm(run.state.trajectory, run.world.constants):
+        while is_undisturbed(run.state.trajectory, run.world.constants):
             begin = run.state.time
             pair_events = self._take_one(run, end)
             if pair_events is not None or run.state.time == begin or until - end <= GRID * run.world.accuracy.step:
@@ -59,10 +67,10 @@ class CalmSteps:
         how = NO_PAIRS
         while how == NO_PAIRS:
             scratch, pairs = stepper.fat_boxes.space_for(stepper.table.pairs), stepper.table.pairs
-            how, sleeps = begin_calm_step(choice, self._candidates, stepper.around, run.motion, pairs, scratch, (begin, end))
+            how, sleeps = begin_undisturbed_step(choice, self._candidates, stepper.around, run.motion, pairs, scratch, (begin, end))
             if how == NO_PAIRS:
                 stepper.renew_pairs(run, end - begin)
-        if how != CALM:
+        if how != BEGUN:
             return None
         if len(sleeps):
             self._paths.put_to_sleep(run, stepper, np.flatnonzero(sleeps & (state.trajectory.mode != FIXED)), begin)

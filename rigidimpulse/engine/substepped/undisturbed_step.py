@@ -21,7 +21,7 @@ from rigidimpulse.model.world import BodyConstants
 from rigidimpulse.motion.trajectory import FIXED, LINEAR
 from rigidimpulse.recording.recorder import sample_paths
 
-NOT_CALM, NO_PAIRS, CALM = map(np.int64, range(3))
+DISTURBED, NO_PAIRS, BEGUN = map(np.int64, range(3))
 """How a step begins: something asks for the loop; the pairs of bodies that may meet must be found again first; it does."""
 KEEPS_LARGE, KEEPS_CHEAP, KEEPS_TOUCHING = range(3)
 """Which islands stay sub-stepped, by `Accuracy.contact_solver`: "auto", "cheapest", "substepped"."""
@@ -57,7 +57,7 @@ class Landing(NamedTuple):
 
 
 @jit
-def is_calm(trajectory, constants):
+def is_undisturbed(trajectory, constants):
     """Whether all that moves are members, and some do."""
     moves = False
     for i in range(constants.dynamic.shape[0]):
@@ -101,17 +101,17 @@ def _all_stay(choice, candidates):
 
 
 @jit_making_arrays
-def begin_calm_step(choice, candidates, around, motion, pairs, scratch, span):
+def begin_undisturbed_step(choice, candidates, around, motion, pairs, scratch, span):
     """Choose who is stepped over a span (begin, end) [s], as at the begin of any step; those that move have arrived.
 
-    around: `Surroundings`; pairs: that may meet; scratch (3, k): space for as many. Returns how it begins (if not CALM, nothing is done),
+    around: `Surroundings`; pairs: that may meet; scratch (3, k): space for as many. Returns how it begins (if not BEGUN, nothing is done),
     and the members (n,) bool that fall or stay asleep: an array of no length if none does.
     """
     member, part, (begin, end) = choice.member, around.part, span
     nobody = np.zeros(0, np.bool_)
     chosen, left, resting = gather_members(motion, candidates, begin, choice.limits, member)
     if chosen == 0 or left > 0:
-        return NOT_CALM, nobody
+        return DISTURBED, nobody
     for i in range(part.shape[0]):
         part[i] = MEMBER if member[i] else SUPPORT
     count = near_pairs(around.bounds, around.fat, pairs, motion.now, motion.acceleration, part, end - begin, scratch)
@@ -122,11 +122,11 @@ def begin_calm_step(choice, candidates, around, motion, pairs, scratch, span):
         a, b = scratch[0, k], scratch[1, k]
         # Who rests beside members may be woken by them.
         if resting > 0 and ((candidates.dynamic[a] and not member[a]) or (candidates.dynamic[b] and not member[b])):
-            return NOT_CALM, nobody
+            return DISTURBED, nobody
         near[0, k], near[1, k], near[2, k] = a, b, scratch[2, k]
     connect_members(near, choice.no_links, member, choice.root, choice.touches)
     if not _all_stay(choice, candidates):
-        return NOT_CALM, nobody
+        return DISTURBED, nobody
     sleeps = settle_islands(
         motion.now, candidates, near, choice.no_links, member, choice.root, choice.no_drives, choice.rest
     )
@@ -135,7 +135,7 @@ def begin_calm_step(choice, candidates, around, motion, pairs, scratch, span):
     for i in range(part.shape[0]):
         choice.taken[i] = choice.taken[i] and member[i]
         candidates.asleep[i] = candidates.asleep[i] and member[i]
-    return CALM, sleeps
+    return BEGUN, sleeps
 
 
 @jit
