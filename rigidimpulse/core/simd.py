@@ -167,6 +167,41 @@ def spread(_typing, simd, x):
     return kind(simd, x), lower
 
 
+EIGHT = 8
+"""Width of vectors that need no `Simd`: LLVM cuts them into those that the processor has."""
+
+
+@intrinsic
+def eight(_typing):
+    """Simd(EIGHT), made where it is used."""
+
+    def lower(context, _builder, _signature, _arguments):
+        return context.get_dummy_value()
+
+    return _simd_type(EIGHT)(), lower
+
+
+@intrinsic
+def highest(_typing, values, places):
+    """The highest of the elements of a vector, and where it is: places are those of the first elements; of equal ones the lowest place."""
+    width, pair = values.width, types.Tuple((types.float64, types.float64))
+
+    def lower(context, builder, _signature, arguments):
+        value, place = arguments[0], builder.fadd(arguments[1], ir.Constant(ir.VectorType(_DOUBLE, width), list(map(float, range(width)))))
+        half = width // 2
+        while half:
+            turned = [(k + half) % width for k in range(width)]
+            other, there = _mix(builder, value, value, turned), _mix(builder, place, place, turned)
+            first = builder.and_(builder.fcmp_ordered("==", other, value), builder.fcmp_ordered("<", there, place))
+            wins = builder.or_(builder.fcmp_ordered(">", other, value), first)
+            value, place = builder.select(wins, other, value), builder.select(wins, there, place)
+            half //= 2
+        found = [builder.extract_element(vector, ir.Constant(_SHORT, 0)) for vector in (value, place)]
+        return context.make_tuple(builder, pair, found)
+
+    return pair(values, places), lower
+
+
 def _place(target: Any, builder: Any, kind: types.Type, array: Any, index: Any, vector: ir.Type) -> Any:
     data = target.make_array(kind)(target, builder, array).data
     return builder.bitcast(builder.gep(data, [index]), vector.as_pointer())

@@ -30,7 +30,7 @@ from rigidimpulse.engine.measure.depth import Posed
 from rigidimpulse.engine.measure.overlap import MeasuredShapes
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
-from rigidimpulse.engine.ways_out import EQUAL, Demand, WaysOut
+from rigidimpulse.engine.ways_out import DEPTH, EQUAL, Demand, WaysOut
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.trajectory import begin
 
@@ -41,6 +41,9 @@ SWEPT = 0.1
 """Part of the residual asked for that a sweep may change: what it changes after a demand is not in the residual of that one."""
 STALLED = 5
 """Rounds without a smaller overlap after which the search gives up."""
+SHALLOW = 0.5
+"""Part of DEPTH by which one body may be behind a face of the other and is surely no deeper in it: along one of three axes a way of DEPTH
+leads out of the face by more than half of that (1 / sqrt(3))."""
 MOST_PLANES = 4
 """Demands that do not last of one pair: the last ones are kept."""
 
@@ -125,7 +128,7 @@ class _Search:
 
     def overlapping(self) -> list[tuple[int, int]]:
         """Pairs that overlap, in order."""
-        return [(a, b) for a, b in self._near() if self.ways_out.overlaps(a, b, self._beside(a, b))]
+        return [(a, b) for a, b in self._near(only_deep=True) if self.ways_out.overlaps(a, b, self._beside(a, b))]
 
     def add_demands(self) -> bool:
         """Add demands of pairs that overlap: those that have none, and those whose demands do not last; returns whether there are any."""
@@ -142,11 +145,11 @@ class _Search:
             # A wedge has several planes.
             new, changed = self.ways_out.again(a, b, before, c, len(known)), True
             known[:] = [new] if new.lasting else [*known[-MOST_PLANES + 1 :], new]
-        for a, b in self._near():
+        # At first they are where they were given: those count that are deep.
+        for a, b in self._near(only_deep=np.array_equal(self.position, self.world.position)):
             if (a, b) in self.demands or not self.ways_out.meets(a, b, self._beside(a, b)):
                 continue
             before, c = self._beside_as_given(a, b), self._beside(a, b)
-            # At first they are where they were given.
             if not (np.array_equal(before, c) or self.ways_out.meets(a, b, before)):
                 self.demands[a, b], changed = [self.ways_out.on_its_side(a, b, before, c)], True
             elif self.ways_out.is_deep(a, b, c):
@@ -160,8 +163,8 @@ class _Search:
     def _beside_as_given(self, a: int, b: int) -> np.ndarray:
         return self.world.position[b] - self.world.position[a]
 
-    def _near(self) -> list[tuple[int, int]]:
-        """Pairs that may overlap, in order."""
+    def _near(self, only_deep: bool) -> list[tuple[int, int]]:
+        """Pairs that may overlap, in order; only_deep: without those that are surely inside each other by less than DEPTH of a size."""
         pair_events = PairEvents(self.run, self.run.state.time)
         pair_events.find_pairs()
         a, b = pair_events.pairs["a"], pair_events.pairs["b"]
@@ -170,7 +173,8 @@ class _Search:
         for i, j in ((a, b), (b, a)):
             asked = np.flatnonzero(~apart)
             i, j = i[asked], j[asked]
-            apart[asked] = self._shapes.surely_apart(shape[i], shape[j], self._seen_from(i, j))
+            allowed = SHALLOW * DEPTH * np.minimum(self.world.size[i], self.world.size[j]) if only_deep else None
+            apart[asked] = self._shapes.surely_apart(shape[i], shape[j], self._seen_from(i, j), allowed)
         return sorted(set(zip(a[~apart].tolist(), b[~apart].tolist(), strict=True)))
 
     def _seen_from(self, i: np.ndarray, j: np.ndarray) -> Posed:

@@ -99,9 +99,8 @@ def make_ledger(frames: Frames, masses: Masses, log: EventLog, work: ForceWork |
         # The first frame is the state as it is given: what happens at that time shows from the next on.
         count[times == times[0]] = 0
         dissipated[cause] = sums[count]
-    for start, end, cause, change in log.spans:
-        done = np.clip((times - start) / (end - start), 0.0, 1.0)
-        dissipated[cause] = dissipated.get(cause, 0.0) - change * done
+    for cause, taken in _work_of_spans(times, log.spans).items():
+        dissipated[cause] = dissipated.get(cause, 0.0) + taken
     if len(log.stretches):
         given = 0.0 if work is None else work.on_bodies(position.shape[1])
         for cause, some in (("joints", log.stretches["by_joints"]), ("contact", ~log.stretches["by_joints"])):
@@ -138,6 +137,21 @@ def mechanics(frames: Frames, masses: Masses, share: np.ndarray) -> tuple[np.nda
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Dot products (f, n) of vectors (f, n, 3)."""
     return np.einsum("fnk,fnk->fn", a, b)
+
+
+def _work_of_spans(times: np.ndarray, spans: list[tuple[float, float, str, float]]) -> dict[str, np.ndarray]:
+    """Energy that was taken in spans of time (start, end, cause, change) until each frame (f,), by cause: evenly in each of them."""
+    out: dict[str, np.ndarray] = {}
+    for cause in dict.fromkeys(span[2] for span in spans):
+        start, end, change = np.array([(span[0], span[1], span[3]) for span in spans if span[2] == cause]).T
+        # Where frames fall into a span they show its part; those after it show all of it.
+        first, last = np.searchsorted(times, start, "right"), np.searchsorted(times, end, "left")
+        taken = np.cumsum(np.bincount(last, -change, len(times) + 1))[:-1]
+        for k in np.flatnonzero(last > first).tolist():
+            inside = slice(first[k], last[k])
+            taken[inside] -= change[k] * (times[inside] - start[k]) / (end[k] - start[k])
+        out[cause] = taken
+    return out
 
 
 def _work_of_stretches(times: np.ndarray, energy: np.ndarray, stretches: np.ndarray) -> np.ndarray:

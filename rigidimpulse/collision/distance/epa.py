@@ -134,7 +134,6 @@ def least_deep(shapes, s, t, pose, small, exact, simplex, polytope):
     """
     d, c = pose
     corner, w = shapes.corner, polytope.w
-    a0, a1, b0, b1 = shapes.corner_first[s], shapes.corner_first[s + 1], shapes.corner_first[t], shapes.corner_first[t + 1]
     faces, gap = _start(polytope, simplex), 0.0
     f = _nearest_face(polytope, faces)
     for corners in range(4, MOST_CORNERS + 1):
@@ -142,7 +141,7 @@ def least_deep(shapes, s, t, pose, small, exact, simplex, polytope):
             return 1.0, 0.0, 0.0, 0.0, np.int64(5)
         f = _nearest_face(polytope, faces)
         x, y, z = -polytope.plane[f, 0], -polytope.plane[f, 1], -polytope.plane[f, 2]
-        i, high, j, low = farthest_of_both(corner, (a0, a1), (b0, b1), c, x, y, z)
+        i, high, j, low = farthest_of_both(shapes, s, t, c, x, y, z)
         middle = d[0] * x + d[1] * y + d[2] * z
         gap = middle - low - high
         # No corner of the hull lies beyond the face: n.w = h, its normal is the axis.

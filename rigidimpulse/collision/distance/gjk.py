@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
+from rigidimpulse.core.simd import EIGHT, eight, highest, load, spread, where_greater
 from rigidimpulse.core.tolerances import TOLERANCES
 
 MOST_ROUNDS = 64
@@ -170,27 +171,28 @@ def _take_back(simplex, count):
 
 
 @jit
-def farthest(corner, first, last, x, y, z):
-    """The corner farthest along (x, y, z) in its axes, and how far."""
-    best, at = -inf, first
-    for v in range(first, last):
-        along = corner[v, 0] * x + corner[v, 1] * y + corner[v, 2] * z
-        if along > best:
-            best, at = along, v
-    return at, best
+def farthest(shapes, s, x, y, z):
+    """The corner of polyhedron s farthest along (x, y, z) in its axes, and how far; of equal ones the first."""
+    simd, column, first = eight(), shapes.column, shapes.column_first[s]
+    length = (shapes.column_first[s + 1] - first) // 3
+    wx, wy, wz = spread(simd, x), spread(simd, y), spread(simd, z)
+    best, at = spread(simd, -inf), spread(simd, 0.0)
+    for k in range(first, first + length, EIGHT):
+        along = load(simd, column, k) * wx + load(simd, column, k + length) * wy + load(simd, column, k + 2 * length) * wz
+        at = where_greater(along, best, spread(simd, float(k - first)), at)
+        best = where_greater(along, best, along, best)
+    far, place = highest(best, at)
+    return shapes.corner_first[s] + np.int64(place), far
 
 
 @jit
-def farthest_of_both(corner, of_a, of_b, c, x, y, z):
-    """The corner of a farthest along (x, y, z), and how far; that of b farthest the other way, and how far.
-
-    of_a, of_b: begin and end of the corners of each.
-    """
-    i, high = farthest(corner, of_a[0], of_a[1], x, y, z)
+def farthest_of_both(shapes, s, t, c, x, y, z):
+    """The corner of s farthest along (x, y, z), and how far; that of t farthest the other way, and how far; c: see `closest`."""
+    i, high = farthest(shapes, s, x, y, z)
     bx, by, bz = (
         c[0, 0] * x + c[1, 0] * y + c[2, 0] * z, c[0, 1] * x + c[1, 1] * y + c[2, 1] * z, c[0, 2] * x + c[1, 2] * y + c[2, 2] * z
     )  # fmt: skip
-    j, low = farthest(corner, of_b[0], of_b[1], -bx, -by, -bz)
+    j, low = farthest(shapes, t, -bx, -by, -bz)
     return i, high, j, low
 
 
@@ -201,11 +203,10 @@ def closest(shapes, s, t, d, c, small, margin, simplex):
     d: centre of b in the axes of a; c = R_a^T R_b; small: factor of the bodies' lengths. 5 corners: they overlap, the axis is none.
     """
     corner, w = shapes.corner, simplex.w
-    a0, a1, b0, b1 = shapes.corner_first[s], shapes.corner_first[s + 1], shapes.corner_first[t], shapes.corner_first[t + 1]
     count, square, greatest = np.int64(0), inf, 0.0
     x, y, z, gap = d[0], d[1], d[2], 0.0
     for _ in range(MOST_ROUNDS):
-        i, high, j, low = farthest_of_both(corner, (a0, a1), (b0, b1), c, x, y, z)
+        i, high, j, low = farthest_of_both(shapes, s, t, c, x, y, z)
         length = sqrt(x * x + y * y + z * z)
         if length == 0.0:
             return x, y, z, 0.0, np.int64(5)

@@ -44,7 +44,7 @@ def _face_gap(shapes, s, t, face, d, c, sign):
         x, y = c[0, 0] * nx + c[0, 1] * ny + c[0, 2] * nz, c[1, 0] * nx + c[1, 1] * ny + c[1, 2] * nz
         z = c[2, 0] * nx + c[2, 1] * ny + c[2, 2] * nz
         middle = -(x * d[0] + y * d[1] + z * d[2])
-    at, far = farthest(shapes.corner, shapes.corner_first[t], shapes.corner_first[t + 1], -x, -y, -z)
+    at, far = farthest(shapes, t, -x, -y, -z)
     return middle - far - shapes.plane[face, 3], at
 
 

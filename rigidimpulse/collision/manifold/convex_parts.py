@@ -24,6 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimpulse.collision.distance.gjk import farthest
 from rigidimpulse.collision.manifold.dispatch import HULLS, PLANE, convex_contacts, is_half_space, num_parts
 from rigidimpulse.collision.manifold.polyhedra import POINTS, Pair
 from rigidimpulse.collision.manifold.reduce import GAP_WEIGHT, PER_NORMAL, reduce_contacts
@@ -228,10 +229,7 @@ def _above(shapes, f, d):
 @inlined
 def _reach(shapes, j, way):
     """How far out solid j reaches along `way` (3,) from its centre, m."""
-    far = -inf
-    for v in range(shapes.corner_first[j], shapes.corner_first[j + 1]):
-        corner = shapes.corner[v]
-        far = max(far, corner[0] * way[0] + corner[1] * way[1] + corner[2] * way[2])
+    _, far = farthest(shapes, j, way[0], way[1], way[2])
     return far
 
 

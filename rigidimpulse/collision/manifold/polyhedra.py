@@ -26,6 +26,7 @@ from rigidimpulse.collision.manifold.hull_faces import faces
 from rigidimpulse.collision.manifold.reduce import GAP_WEIGHT
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.portable import dot
+from rigidimpulse.core.simd import EIGHT
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import turned_by
 
@@ -116,6 +117,8 @@ class Polyhedra(NamedTuple):
     half: np.ndarray  # (p, 3) m, half the sides of boxes along the axes, 0 for others
     corner_first: np.ndarray  # (p+1,)
     corner: np.ndarray  # (V, 3) m
+    column_first: np.ndarray  # (p+1,)
+    column: np.ndarray  # (C,) m, x of the corners of each, then y, then z: each filled up with the first corner to a multiple of EIGHT
     face_first: np.ndarray  # (p+1,)
     plane: np.ndarray  # (F, 4) unit outward normal and offset, m
     loop_first: np.ndarray  # (F+1,)
@@ -195,14 +198,23 @@ def make_polyhedra(geometry: Geometry, convex: np.ndarray, bare: np.ndarray | No
             parts[s].append((len(tables.corners), centre, _reach(corners - centre)))
             tables.add_polyhedron(corners - centre, *_triangles_of(geometry, p), is_shape=False)
     flat = [part for of_shape in parts for part in of_shape]
+    columns = [_columns_of(corners) for corners in tables.corners]
     return Polyhedra(
         half=np.array(tables.half).reshape(-1, 3), corner_first=np.array(tables.corner_first),
-        corner=np.concatenate([*tables.corners, nothing]), face_first=np.array(tables.face_first),
+        corner=np.concatenate([*tables.corners, nothing]), column_first=np.cumsum([0, *map(len, columns)]),
+        column=np.concatenate([*columns, np.zeros(0)]), face_first=np.array(tables.face_first),
         plane=np.concatenate([*tables.planes, np.zeros((0, 4))]), loop_first=np.cumsum([0, *map(len, tables.loops)]),
         loop=np.array([v for loop in tables.loops for v in loop], np.int64), half_space=np.array(tables.half_space).reshape(-1, 4),
         part_first=np.cumsum([0, *map(len, parts)]), part=np.array([which for which, _, _ in flat], np.int64),
         centre=np.array([centre for _, centre, _ in flat]).reshape(-1, 3), bound=np.array([bound for _, _, bound in flat]),
     )  # fmt: skip
+
+
+def _columns_of(corners: np.ndarray) -> np.ndarray:
+    """The columns of corners (v, 3), see `Polyhedra.column`."""
+    number = len(corners)
+    which = np.arange(EIGHT * -(-number // EIGHT))
+    return np.ravel(corners[np.where(which < number, which, 0)].T)
 
 
 def _triangles_of(geometry: Geometry, p: int) -> tuple[np.ndarray, np.ndarray]:

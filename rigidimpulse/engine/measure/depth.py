@@ -161,16 +161,17 @@ def whole_solid(solid: Solid, shape: CompiledShape, geometry: Geometry, index: i
     return replace(solid, surface=surface, middles=middles_of(surface), inside=(geometry, index))
 
 
-def surely_apart(corners: np.ndarray, bounds: np.ndarray, posed: Posed) -> np.ndarray:
+def surely_apart(corners: np.ndarray, bounds: np.ndarray, posed: Posed, allowed: np.ndarray | float = 0.0) -> np.ndarray:
     """Which of c probes (c,) are in front of a plane behind which the solid is, and so apart from it.
 
     corners: (c, v, 3) or (1, v, 3) of the probes, bounds: (c, m, 4) or (1, m, 4) of the solids; without any nothing is known.
+    allowed: m, (c,) or one for all, by which probes may be behind the plane.
     """
     if not corners.shape[1] or not bounds.shape[1]:
         return np.zeros(len(posed.translation), bool)
     placed = corners @ posed.rotation.swapaxes(1, 2) + posed.translation[:, None]
     heights = placed @ bounds[:, :, :3].swapaxes(1, 2) - bounds[:, None, :, 3]
-    return heights.min(axis=1).max(axis=1) > 0.0
+    return heights.min(axis=1).max(axis=1) > -allowed
 
 
 def depth_in(solid: Solid, probe: Probe, posed: Posed) -> np.ndarray:

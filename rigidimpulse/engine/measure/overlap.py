@@ -144,8 +144,8 @@ class MeasuredShapes:
         for probe, solid, those in _kinds(mine[which], other[which]):
             yield self.probe(probe), self.whole(solid), which[those]
 
-    def surely_apart(self, mine: np.ndarray, other: np.ndarray, posed: Posed) -> np.ndarray:
-        """Which candidates (c,) are apart, see `depth.surely_apart`; mine, other: (c,) shapes.
+    def surely_apart(self, mine: np.ndarray, other: np.ndarray, posed: Posed, allowed: np.ndarray | None = None) -> np.ndarray:
+        """Which candidates (c,) are apart, see `depth.surely_apart`; mine, other: (c,) shapes. allowed: (c,) m, None for nothing.
 
         Those of alike numbers of corners and planes are asked about together: scenes of many shapes have few of each kind.
         """
@@ -158,7 +158,8 @@ class MeasuredShapes:
             length = max(AT_ONCE // max(most_corners * most_bounds, 1), 1)
             for first in range(0, len(those), length):
                 here = those[first : first + length]
-                out[here] = surely_apart(corners.of(mine[here]), bounds.of(other[here]), posed.part(here))
+                depth = 0.0 if allowed is None else allowed[here]
+                out[here] = surely_apart(corners.of(mine[here]), bounds.of(other[here]), posed.part(here), depth)
         return out
 
 
