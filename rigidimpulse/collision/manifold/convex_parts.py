@@ -29,7 +29,8 @@ from rigidimpulse.collision.manifold.dispatch import HULLS, PLANE, convex_contac
 from rigidimpulse.collision.manifold.polyhedra import POINTS, Pair
 from rigidimpulse.collision.manifold.reduce import GAP_WEIGHT, PER_NORMAL, reduce_contacts
 from rigidimpulse.core.kernels import inlined, jit
-from rigidimpulse.core.vector import dot, row, subtract, turned_back_by, turned_by
+from rigidimpulse.core.simd import EIGHT, eight, highest, load, root, spread, store
+from rigidimpulse.core.vector import turned_back_by, turned_by
 
 OUT: float = 1e-3
 """How far a point is moved out, in inner radii, to see whether it is in another part."""
@@ -48,7 +49,8 @@ class PartScratch(NamedTuple):
     body: np.ndarray  # (2,) 0 and 1, of the type that numbers of bodies have in pairs: kernels are compiled for that one
     rotation: np.ndarray  # (2, 3, 3)
     velocity: np.ndarray  # (16,) v and w of each
-    place: np.ndarray  # (k, 3) m, centres of the parts of the second body from the first body, in world axes
+    place: np.ndarray  # (4, k) m, centres of the parts of the second body from the first body, in world axes, and their bounds
+    gap: np.ndarray  # (EIGHT,) m, of spheres
     real: np.ndarray  # (k, 10) on a, on b, normal, gap; relative to the first body
     integer: np.ndarray  # (k, 5) parts of both bodies, kind and features
 
@@ -57,8 +59,9 @@ def make_part_scratch(places: int = FIRST_PLACES) -> PartScratch:
     """Scratch memory for one pair of bodies that has `places` contacts, and parts of one body, at most."""
     body = np.arange(2, dtype=np.int32)
     return PartScratch(
-        body, np.empty((2, 3, 3)), np.zeros(16), np.empty((places, 3)), np.empty((places, 10)), np.zeros((places, 5), np.int64)
-    )
+        body, np.empty((2, 3, 3)), np.zeros(16), np.empty((4, places)), np.empty(EIGHT), np.empty((places, 10)),
+        np.zeros((places, 5), np.int64),
+    )  # fmt: skip
 
 
 @inlined
@@ -89,6 +92,30 @@ def _between_spheres(x, y, reach):
     return sqrt(dx * dx + dy * dy + dz * dz) - reach
 
 
+@inlined
+def _place_parts(shapes, bodies, i, away, place):
+    """Write to place where the parts of body i are, which is `away` (3,) from another body, and their bounds; beyond them nothing is."""
+    s = bodies.shape[i]
+    first, number = shapes.part_first[s], shapes.part_first[s + 1] - shapes.part_first[s]
+    for k in range(number):
+        x, y, z = _place_of(shapes, bodies, first + k, i)
+        place[0, k], place[1, k], place[2, k], place[3, k] = away[0] + x, away[1] + y, away[2] + z, shapes.bound[first + k]
+    for k in range(number, number + EIGHT):
+        place[0, k], place[1, k], place[2, k], place[3, k] = inf, 0.0, 0.0, 0.0
+
+
+@inlined
+def _gaps_of_spheres(x, radius, parts, begin):
+    """Write the gaps (m) of a sphere about x (3,) and those about EIGHT placed parts from `begin` on; returns the least of them."""
+    simd, place = eight(), parts.place
+    dx, dy = load(simd, place[0], begin) - spread(simd, x[0]), load(simd, place[1], begin) - spread(simd, x[1])
+    dz = load(simd, place[2], begin) - spread(simd, x[2])
+    gap = root(dx * dx + dy * dy + dz * dz) - (spread(simd, radius) + load(simd, place[3], begin))
+    store(parts.gap, 0, gap)
+    less, _ = highest(-gap, spread(simd, 0.0))
+    return -less
+
+
 @jit
 def contacts_of_parts(shapes, bodies, ends, query, scratch, found):
     """Find the contacts of two bodies, ends = (a, b), relative to the first, in the places of found[1]; both are solid or half spaces.
@@ -101,11 +128,9 @@ def contacts_of_parts(shapes, bodies, ends, query, scratch, found):
     away = (between[0], between[1], between[2])
     count, least, radius, place = np.int64(0), inf, bodies.radius[b], parts.place
     first, last = shapes.part_first[t], shapes.part_first[t + 1]
-    if last - first > place.shape[0]:
+    if last - first + EIGHT > place.shape[1]:
         return np.int64(-1), least
-    for q in range(first, last):
-        x, y, z = _place_of(shapes, bodies, q, b)
-        place[q - first, 0], place[q - first, 1], place[q - first, 2] = away[0] + x, away[1] + y, away[2] + z
+    _place_parts(shapes, bodies, b, away, place)
     for p in range(shapes.part_first[s], shapes.part_first[s + 1]):
         mine = _place_of(shapes, bodies, p, a)
         # Whole bodies first: most parts are near none of the other.
@@ -114,28 +139,28 @@ def contacts_of_parts(shapes, bodies, ends, query, scratch, found):
             least = min(least, gap)
             continue
         _set_part(bodies, a, mine, parts, 0)
-        for q in range(first, last):
-            there, reach = row(place, q - first), shapes.bound[p] + shapes.bound[q]
-            way = subtract(there, mine)
-            # Most are so far away that not even the square root is worth it.
-            square, far = dot(way, way), reach + max(query.margin, least)
-            if square > far * far:
+        for begin in range(0, last - first, EIGHT):
+            # Most are far away: eight at once are told to be.
+            nearest = _gaps_of_spheres(mine, shapes.bound[p], parts, begin)
+            if nearest > query.margin:
+                least = min(least, nearest)
                 continue
-            gap = sqrt(square) - reach
-            if gap > query.margin:
+            for k in range(begin, min(begin + EIGHT, last - first)):
+                if parts.gap[k - begin] > query.margin:
+                    least = min(least, parts.gap[k - begin])
+                    continue
+                if count + POINTS > parts.real.shape[0]:
+                    return np.int64(-1), least
+                q = first + k
+                _set_part(bodies, b, _place_of(shapes, bodies, q, b), parts, 1)
+                between[0], between[1], between[2] = place[0, k] - mine[0], place[1, k] - mine[1], place[2, k] - mine[2]
+                i, j = shapes.part[p], shapes.part[q]
+                flat = is_half_space(shapes.half_space, i) or is_half_space(shapes.half_space, j)
+                pair = Pair(parts.rotation, parts.velocity, parts.body[0], parts.body[1], i, j)
+                number, gap = convex_contacts(PLANE if flat else HULLS, shapes, pair, query, scratch, points)
                 least = min(least, gap)
-                continue
-            if count + POINTS > parts.real.shape[0]:
-                return np.int64(-1), least
-            _set_part(bodies, b, _place_of(shapes, bodies, q, b), parts, 1)
-            between[0], between[1], between[2] = way
-            i, j = shapes.part[p], shapes.part[q]
-            flat = is_half_space(shapes.half_space, i) or is_half_space(shapes.half_space, j)
-            pair = Pair(parts.rotation, parts.velocity, parts.body[0], parts.body[1], i, j)
-            number, gap = convex_contacts(PLANE if flat else HULLS, shapes, pair, query, scratch, points)
-            least = min(least, gap)
-            _keep(points, number, mine, (p, q), parts, count)
-            count += number
+                _keep(points, number, mine, (p, q), parts, count)
+                count += number
     count = _leave_out_hidden(shapes, bodies, ends, (away, query.size), parts, count)
     return reduce_contacts(parts.real, parts.integer, np.int64(0), count, PER_NORMAL, GAP_WEIGHT), least
 
