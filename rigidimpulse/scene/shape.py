@@ -275,6 +275,11 @@ class Shape:
 
     def check(self) -> None:
         """Raise a `SceneError` if the shape has no valid surface; open and inside-out meshes have one."""
+        _ = self._is_valid
+
+    @cached_property
+    def _is_valid(self) -> bool:
+        # Many bodies may have one shape of many parts.
         try:
             if self.kind == "compound":
                 self._check_parts()
@@ -286,6 +291,7 @@ class Shape:
                 self._check_lengths()
         except SceneError as error:
             raise error.within(self.label) from None
+        return True
 
     def surface(self) -> Surface:
         """Return the clean triangle surface of a mesh or box."""
@@ -312,11 +318,15 @@ class Shape:
 
     def parts_flat(self) -> list[Part]:
         """Return the single shapes of a compound, nested ones included; of any other shape the shape itself."""
-        return self._flat(to_whole=False)
+        return list(self._parts_flat)
 
     def solids_flat(self) -> list[Part]:
         """Return the same with the shape that convex parts stand for in their place: what has the mass."""
         return self._flat(to_whole=True)
+
+    @cached_property
+    def _parts_flat(self) -> list[Part]:
+        return self._flat(to_whole=False)
 
     def _flat(self, to_whole: bool) -> list[Part]:
         if to_whole and self.whole is not None:
