@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-MOST, TRIES = 8, 64
-"""Calls that are kept of a kernel; calls after which a kernel that is mostly called with other tuples is looked up by numba only."""
+MOST, TRIES, AGAIN = 32, 64, 512
+"""Calls that are kept of a kernel; calls after which a kernel that is mostly called with other tuples is looked up by numba only; calls
+after which it is tried again: ragdolls that fly are looked at once in a step, and those that lie on a stair many times."""
 MOST_ARRAYS = 2
 """Arrays in a tuple up to which it is told by what it holds, and not by being the same."""
 _NUMBERS = frozenset({int, float, bool, NoneType, np.float64, np.float32, np.int64, np.int32, np.bool_})
@@ -28,12 +29,15 @@ class KnownCalls:
         """None yet."""
         # The arguments are kept too: another object cannot take the place of one of them in memory, and pass for it.
         self._calls: dict[tuple, tuple[Callable[..., Any], tuple]] = {}
-        self._found = self._kept = 0
+        self._found = self._kept = self._passed = 0
 
     def find(self, arguments: tuple) -> tuple[tuple, Callable[..., Any] | None]:
         """What tells these arguments, empty where this is not asked any more; and what to call with them, None if that is not known."""
         if self._kept > TRIES and self._kept > self._found:
-            return (), None
+            self._passed += 1
+            if self._passed < AGAIN:
+                return (), None
+            self._found = self._kept = self._passed = 0
         key = tuple([_told_by(argument) for argument in arguments])
         call = self._calls.get(key)
         if call is None:
@@ -53,7 +57,7 @@ class KnownCalls:
     def forget(self) -> None:
         """Know none any more, and hold no arguments."""
         self._calls.clear()
-        self._found = self._kept = 0
+        self._found = self._kept = self._passed = 0
 
 
 def _told_by(argument: Any) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rigidimpulse.core.kernels import INTERPRETED, forget_calls, jit
-from rigidimpulse.core.known_calls import MOST, TRIES, KnownCalls
+from rigidimpulse.core.known_calls import AGAIN, MOST, TRIES, KnownCalls
 
 pytestmark = pytest.mark.skipif(INTERPRETED, reason="nothing is compiled")
 
@@ -99,6 +99,15 @@ def test_a_kernel_that_gets_other_tuples_each_time_is_not_asked_for_long() -> No
         assert bool(key) == (k <= TRIES)
         known.keep(key, (kept[-1],), len)
     assert len(known._calls) <= MOST
+    # After many calls it is tried again, and goes on with tuples that it gets more than once.
+    same, tried = (kept[0],), []
+    for _ in range(2 * AGAIN):
+        key, call = known.find(same)
+        tried.append(bool(key))
+        if key and call is None:
+            known.keep(key, same, len)
+    first = tried.index(True)
+    assert first == AGAIN - 2 and all(tried[first:])
 
 
 def test_nothing_is_held_when_a_run_has_ended() -> None:

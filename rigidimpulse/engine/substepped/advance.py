@@ -113,7 +113,6 @@ class SubsteppedIslands:
         self._paths = MemberPaths(world, self.label)
         self._outcomes: list[tuple[Outcome, float]] = []
         self._outcome_begin = 0.0
-        self._most = self._steps = 0
         self._refused: dict[str, int] = {}
 
     @cached_property
@@ -164,16 +163,10 @@ class SubsteppedIslands:
         """Whether islands of bodies that no impulse keeps apart are handed over, see `HandOver.may_take`."""
         return self.hand_over.may_take(bodies)
 
-    def _tally(self) -> tuple[int, int]:
-        """Steps that were taken, and members of the largest of them."""
-        others = self.__dict__.get("_undisturbed")
-        return (self._steps, self._most) if others is None else (self._steps + others.steps, max(self._most, others.most))
-
     def summary(self) -> str:
         """What became of sub-stepped islands in the run."""
         refused = ", ".join(f"{reason} ({count})" for reason, count in sorted(self._refused.items()))
-        steps, most = self._tally()
-        text = f"{steps} steps, largest {most} bodies" if steps else "none"
+        text = f"{self._paths.steps} steps, largest {self._paths.most} bodies" if self._paths.steps else "none"
         if times := self.hand_over.times_handed_over():
             text += f", {times} times handed over by the exact regime in the middle of a step"
         if self._joint_stepper is not None:
@@ -341,8 +334,7 @@ class SubsteppedIslands:
     def finish(self, run: Run) -> None:
         """Account for the energy of sub-steps that last until the end of the run, and tell the plan what was done."""
         refused = {f"refused: {reason}": count for reason, count in self._refused.items()}
-        steps, most = self._tally()
-        run.plan.tell(NAME, self.summary(), {"steps": steps, "largest island": most, **refused})
+        run.plan.tell(NAME, self.summary(), {"steps": self._paths.steps, "largest island": self._paths.most, **refused})
         members, time = np.flatnonzero(run.state.trajectory.mode == LINEAR), run.state.time
         if not len(members):
             return
@@ -427,7 +419,7 @@ class SubsteppedIslands:
         fresh = members[~self._taken[members]]
         if len(fresh):
             self._take_in(run, fresh, island.time)
-        self._most = max(self._most, len(members))
+        self._paths.most = max(self._paths.most, len(members))
         members = members[~self.asleep[members]]
         if self._jointed.any() and len(joints := run.joints.at(members[self._jointed[members]])):
             run.joints.break_at(run, joints, island.time)
@@ -435,7 +427,7 @@ class SubsteppedIslands:
         kept = self.stepper.kept if island.time > pair_events.begin else 0.0
         self._outcomes, self._outcome_begin = [], island.time
         for part in self._solved_together(run, pair_events, members):
-            self._steps += 1
+            self._paths.steps += 1
             end = self._end_of(run, pair_events, island.time, part)
             out = self._step(run, part, np.intersect1d(fresh, part) if len(fresh) else fresh, (island.time, end), kept)
             if out is None:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimpulse.core.known_calls import MOST
 from rigidimpulse.core.simd import ROW
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland
@@ -78,6 +79,9 @@ class JointedStepper:
         self._allowed, self._open = CLOSED * world.joint_size, OPEN * world.joint_size
         self._near, self._energies = np.zeros(n, bool), np.zeros(4)
         self._waypoints, self._no_waypoints = make_waypoints(MOST_WAYPOINTS, n), make_waypoints(0, n)
+        # The same tuples for the same islands: calls of kernels are quicker by it.
+        self._islands: dict[tuple[bytes, bytes], JointedIsland] = {}
+        self._kept: dict[tuple[int, bool], Kept] = {}
 
     def step(self, run: Run, members: np.ndarray, span: tuple[float, float], set_up: Callable[[Fineness], None]) -> Outcome | None:
         """Step an island, whose bodies have joints, over a span (begin, end), s, as finely as it asks for; None if no sub-steps hold it.
@@ -122,17 +126,28 @@ class JointedStepper:
         """Step the island that is set up from `time` to `end`; None if joints stay open."""
         stepper, which = self._stepper, run.joints.at(self._stepper.members)
         island = self._island(run, which)
-        moment, given = np.zeros((len(self._joints.body_a), 3)), np.zeros((len(stepper.table.pairs.first), 10))
-        waypoints = self._waypoints if stepper.begin_step(run, time, end) else self._no_waypoints
-        waypoints.number[0] = 0
-        kept = Kept(self._stiffening, moment, self._driven, np.zeros(1), given, np.zeros(3), waypoints)
+        kept = self._kept_from(stepper.begin_step(run, time, end))
         of_world = self._world.coefficients, stepper.balance
         stepper.step_by(run, lambda some, h: step_island(island, stepper.bodies, stepper.table.arrays, *of_world, kept, some, h))
         self.halved += int(kept.reached[HALVED])
         if not kept.reached[GAP] <= self._open:
             return None
         stop_island(island, stepper.bodies, stepper.table.arrays, *of_world, kept)
-        return _Tried(which, moment, given, stepper.end_step(waypoints if len(waypoints.time) else None))
+        return _Tried(which, kept.moment, kept.given, stepper.end_step(kept.waypoints if len(kept.waypoints.time) else None))
+
+    def _kept_from(self, has_frames: bool) -> Kept:
+        """What is kept from sub-step to sub-step, at the start of a step; has_frames: whether frames fall into it."""
+        key = len(self._stepper.table.pairs.first), has_frames
+        if key not in self._kept:
+            if len(self._kept) == MOST:
+                self._kept.clear()
+            moment, given = np.zeros((len(self._joints.body_a), 3)), np.zeros((key[0], 10))
+            waypoints = self._waypoints if has_frames else self._no_waypoints
+            self._kept[key] = Kept(self._stiffening, moment, self._driven, np.zeros(1), given, np.zeros(3), waypoints)
+        kept = self._kept[key]
+        for array in (kept.moment, kept.before, kept.given, kept.reached, kept.waypoints.number):
+            array[:] = 0
+        return kept
 
     def _keep(self, run: Run, tried: _Tried, span: tuple[float, float]) -> Outcome:
         """Note what joints and contacts did in a step that is taken; returns its outcome."""
@@ -152,9 +167,14 @@ class JointedStepper:
         now.inv_mass[:] = 0.0
         now.inv_mass[members] = world.inv_mass[stepper.order[members]]
         self._driven[:] = bool(world.moving.any()) or bool(self._driven_joints[which].any())
-        return JointedIsland(
-            self._joints, which, now, stepper.bodies.rotation, members, self._column, run.joints.memory, self._allowed
-        )
+        key = which.tobytes(), members.tobytes()
+        if key not in self._islands:
+            if len(self._islands) == MOST:
+                self._islands.clear()
+            self._islands[key] = JointedIsland(
+                self._joints, which, now, stepper.bodies.rotation, members, self._column, run.joints.memory, self._allowed
+            )
+        return self._islands[key]
 
     def _keeps_energy(self, run: Run, out: Outcome) -> bool:
         """Whether members have no more energy than before, up to GAINED of what moves and a rise by the margin; no if it is no number.

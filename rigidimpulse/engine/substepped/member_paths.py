@@ -57,6 +57,7 @@ class MemberPaths:
     Attributes:
         ends: when those of each island end, s, by its label.
         ended_at: when paths were last ended, s.
+        steps: pieces of steps that were stepped so far. most: members of the largest of them.
 
     """
 
@@ -67,6 +68,7 @@ class MemberPaths:
         self._began: dict[int, _Began] = {}
         self.ends: dict[int, float] = {}
         self.ended_at = -np.inf
+        self.steps = self.most = 0
 
     def labels_of(self, members: np.ndarray) -> list[int]:
         """Labels of the islands of members, ascending."""

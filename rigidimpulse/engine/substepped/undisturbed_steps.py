@@ -6,7 +6,7 @@ without joints, on what stands still, and no island begins or ends to be sub-ste
     the trajectories end, the members are chosen (`begin_undisturbed_step`)
     pieces, one after the other: load, sub-steps (`ContactStepper`), new trajectories (`land_members`)
 
-in a few calls of kernels, with the bits of the other order. It took five times as long for a row of dominoes. Bodies that rest elsewhere
+in a few calls of kernels, with the bits of the other order. A row of dominoes takes three quarters of the time. Bodies that rest elsewhere
 are looked for as they are there; at the first that a member may reach, the other order goes on in the middle of the step.
 """
 
@@ -34,30 +34,25 @@ from rigidimpulse.motion.trajectory import FIXED, LINEAR
 
 
 class UndisturbedSteps:
-    """Takes such steps.
-
-    Attributes:
-        steps: pieces of steps that were taken. most: members of the largest of them.
-
-    """
+    """Takes such steps."""
 
     def __init__(self, stepper: ContactStepper, paths: MemberPaths, candidates: Candidates, choice: Choice, landing: Landing) -> None:
-        """No step has been taken."""
+        """Without a step under way; choice: how members are chosen of the candidates, landing: what is brought up to date after a piece."""
         self._stepper, self._paths, self._candidates = stepper, paths, candidates
         self._choice, self._landing = choice, landing
-        self.steps = self.most = 0
 
     def take(self, run: Run, end: float, until: float) -> PairEvents | None:
-        """Take steps, the first one to `end` [s], as far as `until` [s], as long as they are such.
+        """Take steps, the first one to `end` [s], as far as `until` [s], as long as they are such; nothing but members moves so far.
 
         Returns the pairs of a step that has begun and that the loop must finish; else None.
         """
-        while is_undisturbed(run.state.trajectory, run.world.constants):
+        goes_on = True
+        while goes_on:
             begin = run.state.time
             pair_events = self._take_one(run, end)
             if pair_events is not None or run.state.time == begin or until - end <= GRID * run.world.accuracy.step:
                 return pair_events
-            end = step_end.py_func(end, until, run.world.accuracy.step)
+            end, goes_on = step_end.py_func(end, until, run.world.accuracy.step), is_undisturbed(run.state.trajectory, run.world.constants)
         return None
 
     def _take_one(self, run: Run, end: float) -> PairEvents | None:
@@ -82,7 +77,7 @@ class UndisturbedSteps:
             pair_events.find_pairs()
             if len(pair_events.pairs):
                 return pair_events
-        self.most = max(self.most, int(np.count_nonzero(choice.member)))
+        self._paths.most = max(self._paths.most, int(np.count_nonzero(choice.member)))
         return self._take_pieces(run, pair_events, (begin, end))
 
     def _take_pieces(self, run: Run, pair_events: PairEvents | None, span: tuple[float, float]) -> PairEvents | None:
@@ -122,4 +117,4 @@ class UndisturbedSteps:
         )  # fmt: skip
         way = None if out.waypoints is None else way_of(out, out.waypoints, run.state.now, span, flies=False)
         self._paths.know(out.members, self._landing.energies, span, NO_JOINTS, way)
-        self.steps += 1
+        self._paths.steps += 1
