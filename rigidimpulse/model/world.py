@@ -169,7 +169,7 @@ class World:
 
         Bodies that are let go later count from the start: steps are taken at once by what it says then.
         """
-        ever_dynamic = any(body.motion == "dynamic" for body in self.scene.bodies)
+        ever_dynamic = any(body.becomes_dynamic for body in self.scene.bodies)
         return ever_dynamic and self.num_bodies > 1 and self.accuracy.response != "penalty"
 
     @property

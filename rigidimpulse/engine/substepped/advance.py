@@ -195,7 +195,7 @@ class SubsteppedIslands:
         """
         # Nobody looks at the run between such steps, and members without joints are asked for.
         watched = run.plan.observe or run.soft_bodies.moves or self._jointed.any()
-        if watched or not is_undisturbed(run.state.trajectory, self._world.constants):
+        if watched or not self._taken.any() or not is_undisturbed(run.state.trajectory, self._world.constants):
             return None
         with run.plan.clock(NAME):
             return self._undisturbed.take(run, end, until)

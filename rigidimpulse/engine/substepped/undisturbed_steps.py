@@ -12,6 +12,8 @@ are looked for as they are there; at the first that a member may reach, the othe
 
 from __future__ import annotations
 
+from time import perf_counter
+
 import numpy as np
 
 from rigidimpulse.engine.exact.step_begin import GRID, step_end
@@ -32,6 +34,9 @@ from rigidimpulse.engine.substepped.undisturbed_step import (
 from rigidimpulse.engine.substepped.waypoints import way_of
 from rigidimpulse.motion.trajectory import FIXED, LINEAR
 
+PATIENCE = 0.1
+"""s of the clock after which those who watch the run are heard, between two steps. What happens does not depend on it."""
+
 
 class UndisturbedSteps:
     """Takes such steps."""
@@ -46,13 +51,14 @@ class UndisturbedSteps:
 
         Returns the pairs of a step that has begun and that the loop must finish; else None.
         """
-        goes_on = True
+        goes_on, last = True, perf_counter() + PATIENCE
         while goes_on:
             begin = run.state.time
             pair_events = self._take_one(run, end)
             if pair_events is not None or run.state.time == begin or until - end <= GRID * run.world.accuracy.step:
                 return pair_events
-            end, goes_on = step_end.py_func(end, until, run.world.accuracy.step), is_undisturbed(run.state.trajectory, run.world.constants)
+            end = step_end.py_func(end, until, run.world.accuracy.step)
+            goes_on = perf_counter() < last and is_undisturbed(run.state.trajectory, run.world.constants)
         return None
 
     def _take_one(self, run: Run, end: float) -> PairEvents | None:
