@@ -55,3 +55,22 @@ def test_bodies_that_topple_stay_on_the_floor_at_frames_inside_a_step() -> None:
     height = edge[: last - OFTEN, 2]
     assert turning[last] > 3.0
     assert np.ptp(height[OFTEN:]) < 2e-5
+
+
+def test_frames_of_an_island_that_is_hit_within_a_step_follow_the_hit() -> None:
+    """Two boxes that do not touch are stepped together. A bullet hits one in the middle of a step: it goes on from there in all frames.
+
+    Between two frames a body moves by no more than its speed after the hit allows. Frames along the way of before would stand still until
+    the step ends, and jump by up to 1/60 s of that speed then: sixteen frames at once.
+    """
+    ice, settings, fps = ri.Material(static_friction=0, dynamic_friction=0), ri.Accuracy(contact_solver="substepped"), 960
+    scene = ri.Scene(gravity=(0, 0, -9.81))
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static"))
+    for k in range(2):
+        scene.add(ri.Body(f"box {k}", ri.Shape.box(0.1), position=(0, 2.0 * k, 0.05), velocity=(0, 0.4, 0), material=ice))
+    heavy = ri.Material(density=8000)
+    scene.add(ri.Body("bullet", ri.Shape.sphere(0.02), position=(-18.67, 0, 0.05), velocity=(200, 0.4, 0.456), material=heavy))
+    run = ri.simulate(scene, 0.2, fps=fps, accuracy=settings)
+    speed = np.linalg.norm(run.velocity("box 0"), axis=1).max()
+    way = np.linalg.norm(np.diff(run.position("box 0"), axis=0), axis=1)
+    assert speed > 5.0 and way.max() <= 1.01 * speed / fps

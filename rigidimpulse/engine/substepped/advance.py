@@ -178,15 +178,16 @@ class SubsteppedIslands:
         """Takes steps in which nothing else moves."""
         world, cheapest, n = self._world, self.hand_over.cheapest, self._world.num_bodies
         rule = KEEPS_LARGE if self._auto else KEEPS_TOUCHING if cheapest is None else KEEPS_CHEAP
+        cheapest = cheapest or CheapestRegime(self._jointed)
         choice = Choice(
-            rule, self._limits, self._rest, self.counts, (cheapest or CheapestRegime(self._jointed)).costs, self._taken,
+            rule, self._limits, self._rest, self.counts, cheapest.costs, self._taken,
             np.zeros(n, bool), self._root, self._touches, np.zeros((0, 2), np.int64), np.zeros(n, bool),
         )  # fmt: skip
         landing = Landing(
             world.constants, self.stepper.pressed, self.label, np.zeros((4, n)), self._stood, self.sleep_timer, self.stepper.inner,
             self.stepper.skin,
         )  # fmt: skip
-        return UndisturbedSteps(self.stepper, self._paths, self._candidates, choice, landing)
+        return UndisturbedSteps(self.stepper, self._paths, self._candidates, choice, cheapest, landing)
 
     def take_undisturbed_steps(self, run: Run, end: float, until: float) -> PairEvents | None:
         """Take steps, the first one to `end` [s], as far as `until` [s], as long as nothing but members moves, see `undisturbed_steps`.

@@ -99,12 +99,16 @@ class MemberPaths:
         if not len(members):
             return
         world, labels = self._world, self.labels_of(members)
-        ways = {id(began.way): began.way for label in labels if (began := self._began.get(label)) is not None}
-        for whole in ways.values():
-            if whole is not None:
-                # An island that something hits ends before others that were stepped with it.
-                way = part_of(whole, members)
-                write_frames(run.recorder, way, time, Flown(world.inertia[way.bodies], world.steady_acceleration[way.bodies]))
+        on_way: dict[int, list[int]] = {}
+        for label in labels:
+            if (began := self._began.get(label)) is not None and began.way is not None:
+                on_way.setdefault(id(began.way), []).append(label)
+        for on_it in on_way.values():
+            whole = self._began[on_it[0]].way
+            assert whole is not None
+            # An island that was hit is on a way of its own from there, and others that were stepped with it are still on theirs.
+            way = part_of(whole, members[np.isin(self._label[members], on_it)])
+            write_frames(run.recorder, way, time, Flown(world.inertia[way.bodies], world.steady_acceleration[way.bodies]))
         _end_paths(run.motion, world.constants, members, time, run.recorder.frames, run.recorder.written, self._label, self._energy)
         for label in labels:
             if label in self._began:

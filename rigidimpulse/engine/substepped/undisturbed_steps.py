@@ -16,6 +16,7 @@ from time import perf_counter
 
 import numpy as np
 
+from rigidimpulse.engine.cheapest import CheapestRegime
 from rigidimpulse.engine.exact.step_begin import GRID, step_end
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.run import Run
@@ -41,10 +42,16 @@ PATIENCE = 0.1
 class UndisturbedSteps:
     """Takes such steps."""
 
-    def __init__(self, stepper: ContactStepper, paths: MemberPaths, candidates: Candidates, choice: Choice, landing: Landing) -> None:
-        """Without a step under way; choice: how members are chosen of the candidates, landing: what is brought up to date after a piece."""
+    def __init__(
+        self, stepper: ContactStepper, paths: MemberPaths, candidates: Candidates, choice: Choice, cheapest: CheapestRegime,
+        landing: Landing,
+    ) -> None:  # fmt: skip
+        """Without a step under way; choice: how members are chosen of the candidates, landing: what is brought up to date after a piece.
+
+        cheapest: whose costs the choice knows, and what is told what pieces cost.
+        """
         self._stepper, self._paths, self._candidates = stepper, paths, candidates
-        self._choice, self._landing = choice, landing
+        self._choice, self._cheapest, self._landing = choice, cheapest, landing
 
     def take(self, run: Run, end: float, until: float) -> PairEvents | None:
         """Take steps, the first one to `end` [s], as far as `until` [s], as long as they are such; nothing but members moves so far.
@@ -115,8 +122,7 @@ class UndisturbedSteps:
         stepper, (time, end) = self._stepper, span
         stepper.load(run, members, still, end - time, kept)
         out = stepper.advance(run, time, end)
-        self._choice.costs.pieces[members] += 1.0
-        self._choice.costs.looks[members] += stepper.parts
+        self._cheapest.note(members, stepper.parts)
         recorded = run.recorder.frames, run.recorder.written
         land_members(
             stepper.island, self._landing, run.motion, run.state.correction, recorded, members, out.places, (time, end - time)
