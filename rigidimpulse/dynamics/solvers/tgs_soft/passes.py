@@ -52,6 +52,10 @@ from rigidimpulse.dynamics.solvers.tgs_soft.records import (
     Y,
 )
 
+SLIPS = 16.0
+"""How many times what static friction bears a sub-step must ask for until a contact slips. A new contact bears little in its first
+sub-steps, and friction of the next ones is to stop what slides by then: boxes on a slope between both coefficients slid off it. So what
+slips by less than this times mu g h has static friction."""
 DEEPEST = 10.0
 """Depth, in skins, beyond which a contact pushes no harder."""
 TINY = TOLERANCES.sub_stepping.least_divisor
@@ -205,8 +209,9 @@ def _rub(simd, record, o, press, lever, u1, u2, w3):
     old = load(simd, record, o + TWIST * w)
     # The twist first: it is clamped to mu sum p r.
     free = fma(-load(simd, record, o + STEP_N * w), w3, old)
-    size = where_greater(free, zero, free, -free)
-    new = where_greater(size, static * lever, _clamp(simd, free, dynamic * lever), free)
+    size, most, slips = where_greater(free, zero, free, -free), static * lever, spread(simd, SLIPS)
+    bound = where_greater(size, slips * most, dynamic * lever, most)
+    new = where_greater(size, most, _clamp(simd, free, bound), free)
     store(record, o + TWIST * w, new)
     d3 = new - old
     # What the twist did to the slip along t_1 and t_2.
@@ -215,9 +220,11 @@ def _rub(simd, record, o, press, lever, u1, u2, w3):
     old_1, old_2 = load(simd, record, o + PUSH_1 * w), load(simd, record, o + PUSH_2 * w)
     step = load(simd, record, o + STEP_T * w)
     f1, f2 = fma(-step, u1, old_1), fma(-step, u2, old_2)
-    # Beyond the static cone friction is the dynamic one, along the same direction.
+    # What slips has dynamic friction, along the same direction.
     square, most = fma(f1, f1, f2 * f2), static * press
-    factor = where_greater(square, most * most, dynamic * press / root(square + spread(simd, TINY * TINY)), one)
+    slow = slips * most
+    bound = where_greater(square, slow * slow, dynamic * press, most)
+    factor = where_greater(square, most * most, bound / root(square + spread(simd, TINY * TINY)), one)
     f1, f2 = f1 * factor, f2 * factor
     store(record, o + PUSH_1 * w, f1)
     store(record, o + PUSH_2 * w, f2)
