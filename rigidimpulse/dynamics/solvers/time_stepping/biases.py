@@ -7,14 +7,15 @@
     hard row of a joint      u' = -x / h                         x: coordinate less target; what is left is closed by `flight`
     limit not reached        u' >= -x / h                        (u' <= -x / h of an upper one)
     limit overrun            u' >= PUSH |x| / h
-    soft row, drive          p = -g k x - h c (u' - r)              where k W h^2 < SLOW, g: half of this sub-step and of the one before
-                             p = -h (k (x + h u') + c (u' - r))     elsewhere
+    soft row, drive          p = -g (k x + c (u' - r))              where k W h^2 < SLOW, g: half of this sub-step and of the one before
+                             p = -h (k (x + h u') + c (u' - r))     elsewhere, g = h
 
 The soft row is explicit in x where its own oscillation is well resolved, so that it keeps its energy, and implicit where it is not, so that
 any stiffness is stable. Explicit springs pull for half of a sub-step at each of its ends, as gravity does (Verlet). The pull at the end of
 one and that at the start of the next are one impulse; at the end of a step the last half is given by itself. Without these halves the
-energy at the end of steps was off by w h / 2. With d = h c, or h (h k + c), the row reads  u' + p / d = push / d;  where d = 0
-the impulse is known.
+energy at the end of steps was off by w h / 2. With d = g c, or h (h k + c), the row reads  u' + p / d = push / d;  where d = 0
+the impulse is known. It is bounded by g times the greatest force: a motor whose bound was that of a whole sub-step lifted 1/16 more than
+it can hold.
 """
 
 from math import inf, sqrt
@@ -79,7 +80,8 @@ def fill_joint_biases(island, rows, start, h, before):
                 rows.lower[r] = rows.upper[r] = rows.impulse[r] = 0.0
             else:
                 stiffness, damping = spring_of(joints, k, weight[i])
-                _soften(rows, r, (stiffness, damping, joints.rate[k]), weight[i], x, (h, before))
+                ahead, pulls = (0.0, 0.5 * (h + before)) if _is_explicit(stiffness, weight[i], h) else (h, h)
+                _soften(rows, r, (stiffness, damping, joints.rate[k]), x, (joints.lower[k], joints.upper[k]), ahead, pulls)
             i += 1
     return direction
 
@@ -91,21 +93,22 @@ def _is_explicit(stiffness, weight, h):
 
 
 @jit
-def _soften(rows, r, spring, weight, x, sub_steps):
-    """Let row r be the spring (stiffness, damping, rate) at the coordinate x; its bounds are there. sub_steps: this, the one before, s."""
-    (stiffness, damping, rate), (h, before) = spring, sub_steps
-    explicit = _is_explicit(stiffness, weight, h)
-    pulls = 0.5 * (h + before) if explicit else h
-    d, push = h * (damping if explicit else h * stiffness + damping), h * damping * rate - pulls * stiffness * x
+def _soften(rows, r, spring, x, bounds, ahead, pulls):
+    """Let row r be the spring (stiffness, damping, rate) at the coordinate x, with bounds of its force: it pulls for `pulls` s.
+
+    ahead: s, from x on to where it pulls, 0 for an explicit one.
+    """
+    (stiffness, damping, rate), (lower, upper) = spring, bounds
+    d, force = pulls * (ahead * stiffness + damping), damping * rate - stiffness * x
     if d <= TINY:
-        share = pulls / h
-        rows.impulse[r] = min(max(push, share * rows.lower[r]), share * rows.upper[r])
+        rows.impulse[r] = pulls * min(max(force, lower), upper)
         rows.lower[r] = rows.upper[r] = rows.impulse[r]
         # It is not FREE, or solvers that eliminate such rows would take it for a hard one.
         rows.kind[r] = BOUNDED
         return
+    rows.lower[r], rows.upper[r] = pulls * lower, pulls * upper
     rows.softness[r] = 1.0 / d
-    rows.bias[r] -= push / d
+    rows.bias[r] -= pulls * force / d
 
 
 @jit_making_arrays
@@ -135,10 +138,8 @@ def fill_still_biases(island, contacts, of_contacts, start, before):
             if side * value[i] > 0.0:
                 rows.lower[r] = rows.upper[r] = 0.0
             elif joints.stiffness[k] < inf:
-                stiffness, _ = spring_of(joints, k, weight[i])
+                stiffness, damping = spring_of(joints, k, weight[i])
                 pulls = 0.5 * before if _is_explicit(stiffness, weight[i], before) else 0.0
-                rows.impulse[r] = pulls * min(max(-stiffness * value[i], joints.lower[k]), joints.upper[k])
-                rows.lower[r] = rows.upper[r] = rows.impulse[r]
-                rows.kind[r] = BOUNDED
+                _soften(rows, r, (stiffness, damping, joints.rate[k]), value[i], (joints.lower[k], joints.upper[k]), 0.0, pulls)
             i += 1
     return direction

@@ -81,18 +81,19 @@ def step_island(island, bodies, table, coefficients, balance, kept, sub_steps, h
     while left > LAST * h:
         step = min(step, left)
         _remember(bodies, now, members, begin, before)
+        _remember(bodies, now, supports, begin, before)
         kick(bodies, now, members, 0.5 * step)
         most = GIVE_UP * island.allowed if step > h / MOST_HALVED else np.inf
-        gap = _sub_step(island, bodies, table, coefficients, balance, kept, (begin, spin, most), step)
+        gap = _sub_step(island, bodies, table, coefficients, balance, kept, (begin, spin, supports, most), step)
         if gap > most:
             _take_back(bodies, now, members, begin, before)
+            _take_back(bodies, now, supports, begin, before)
             step *= 0.5
             reached[HALVED] += 1.0
             continue
         for i in members:
             for k in range(3):
                 now.angular_velocity[i, k] = spin[i, k]
-        carry_supports(bodies, now, supports, step)
         set_inertia(bodies, now, members, stiffening)
         kick(bodies, now, members, 0.5 * step)
         # What is no number stays.
@@ -197,7 +198,8 @@ def _energies(bodies, now, members, rotation):
 def _sub_step(island, bodies, table, coefficients, balance, kept, flight, h):
     """Solve the rows at the present pose, fly, and close; returns the gap that is left of joints, m or rad.
 
-    flight: see `flight.fly`; and the gap up to which things are counted and kept for later: else the caller takes the sub-step back.
+    flight: see `flight.fly`; the supports that move; and the gap up to which things are counted and kept for later: else the caller takes
+    the sub-step back.
     """
     members, now, driven, moment = island.members, island.bodies, kept.driven, kept.moment
     contacts, place = contact_points(bodies, now, table.pairs, table.points, coefficients, h)
@@ -217,7 +219,9 @@ def _sub_step(island, bodies, table, coefficients, balance, kept, flight, h):
     start_without_joints(rows, free, ACCURATE * scale)
     solve_until_slip(None, start_of, members.shape[0], contacts, ACCURATE * scale, SLIP * scale)
     change_velocities(now, members, rows)
-    begin, spin, most = flight
+    begin, spin, supports, most = flight
+    # Joints close where their supports will be: before, what hung from a moving body was a sub-step behind it.
+    carry_supports(bodies, now, supports, h)
     gap = fly_and_close(island, bodies, rows, free, (begin, spin), h)
     # All that impulses did, those that close joints included: they act at the start. Half of the pull of gravity is in the velocities there
     # that acts after the flight: its share of the work is not theirs.
