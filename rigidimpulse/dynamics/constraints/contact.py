@@ -89,12 +89,19 @@ def start_contact_impulses(rows, first_row, force, h):
             rows.impulse[first_row[c] + k] = force[c, k] * h
 
 
+@jit
+def _inverse_mass(bodies, i):
+    """1 / m of a body, 0 of the world."""
+    return bodies.inv_mass[i] if i >= 0 else 0.0
+
+
 @jit_making_arrays
 def fill_contact_bias(problem, excess, h, of_contacts):
     """Write b = u + h a of the contact rows; excess (m,): g - d to be closed, m.
 
-    Returns the largest speed h a gained [m/s], or the round-off of the members' speeds if that is larger, and the velocities u (m, 3) along
-    the frames. Bodies that fall freely side by side gain none from each other: their residual is round-off, and means nothing by itself.
+    Returns the largest speed h a gained [m/s], or the round-off of the members' speeds, of what they gain, and of what the impulses give
+    them from which the solver starts, if that is larger; and the velocities u (m, 3) along the frames. Bodies that fall freely side by side
+    gain none from each other: their residual is round-off, and means nothing by itself. Nor when what bore them has just been let go.
     """
     bodies, contacts, turning = problem.bodies, problem.contacts, problem.turning
     rows, first_row, frames = of_contacts.rows, of_contacts.first_row, of_contacts.frames
@@ -102,8 +109,10 @@ def fill_contact_bias(problem, excess, h, of_contacts):
     u, a, scale = np.empty((m, 3)), np.empty((m, 3)), TINY
     for i in problem.members:
         for k in range(3):
-            scale = max(scale, ROUND_OFF * abs(bodies.velocity[i, k]))
+            scale = max(scale, ROUND_OFF * (abs(bodies.velocity[i, k]) + h * abs(problem.acceleration[i, k])))
     for c in range(m):
+        a_gives, b_gives = _inverse_mass(bodies, contacts.body_a[c]), _inverse_mass(bodies, contacts.body_b[c])
+        scale = max(scale, ROUND_OFF * abs(rows.impulse[first_row[c]]) * max(a_gives, b_gives))
         contact_velocity(contacts, c, frames[c], problem.acceleration, problem.angular_acceleration, a[c])
         for k in range(3):
             for j in range(3):
