@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.core.quaternion import multiply, rotate
+from rigidimpulse.core.quaternion import conjugate, multiply, quaternion_from_rotation_vector, rotate, rotation_vector
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.forces.constant import ConstantForce, push_of_forces
 from rigidimpulse.engine.compile_shapes import compile_shapes, world_boxes
@@ -113,8 +114,9 @@ def _start(bodies: list[Body], masses: list[BodyMass]) -> dict[str, Any]:
     """Centres of mass and principal axes in the body frames, where these are and how they move at the start; see `World`."""
     offset = np.array([m.center_of_mass for m in masses], float).reshape(-1, 3)
     turn = np.array([m.turn for m in masses], float).reshape(-1, 4)
-    origin = np.array([body.position for body in bodies], float).reshape(-1, 3)
-    orientation = np.array([body.unit_orientation() for body in bodies], float).reshape(-1, 4)
+    poses = [_pose_at_start(body) for body in bodies]
+    origin = np.array([place for place, _ in poses], float).reshape(-1, 3)
+    orientation = np.array([turned for _, turned in poses], float).reshape(-1, 4)
     return {
         "offset": offset, "turn": turn,
         "position": origin + rotate(orientation, offset),
@@ -122,6 +124,19 @@ def _start(bodies: list[Body], masses: list[BodyMass]) -> dict[str, Any]:
         "velocity": np.array([body.velocity for body in bodies], float).reshape(-1, 3),
         "angular_velocity": np.array([body.angular_velocity for body in bodies], float).reshape(-1, 3),
     }  # fmt: skip
+
+
+def _pose_at_start(body: Body) -> tuple[ArrayLike, np.ndarray]:
+    """Position [m] and orientation of a body's frame at time 0: with keyframes it is where they have it, before the first one at that."""
+    if body.keyframes is None:
+        return body.position, body.unit_orientation()
+    times, positions, turned = body.keyframes.arrays(body.orientation)
+    k = max(int(np.searchsorted(times, 0.0, "right")) - 1, 0)
+    if times[k] >= 0.0 or k + 1 == len(times):
+        return positions[k], turned[k]
+    share = -times[k] / (times[k + 1] - times[k])
+    turn = share * rotation_vector(multiply(turned[k + 1], conjugate(turned[k])))
+    return positions[k] + share * (positions[k + 1] - positions[k]), multiply(quaternion_from_rotation_vector(turn), turned[k])
 
 
 def _refuse_fixed_steps(accuracy: Accuracy) -> None:
