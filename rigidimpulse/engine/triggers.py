@@ -1,9 +1,9 @@
 """Triggers: volumes that report which bodies overlap them, and never push.
 
-Overlap is tested at the start of the run, at the end of each step, and at times inside the step. Inside the step bodies are taken on the
-trajectories that they have at its end. The tests are so close in time that neither side moves by more than half the thickness of both
-between two of them. Where the answer changes, bisection on these trajectories finds the time to `SHARPNESS`. The time is late by at
-most a step if the body had an impact in that step.
+Overlap is tested at the start of the run, at the end of each step, and at times inside the step. The tests are so close in time that
+neither side moves by more than half the thickness of both between two of them. Where the answer changes, bisection finds the time to
+`SHARPNESS`. Inside the step bodies are taken on the trajectory that they had at its begin until their first impact, and on that which they
+have at its end since their last one; between these two, in a step with several, they go straight.
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ from numpy.typing import ArrayLike
 from rigidimpulse.collision.distance.fcl import Narrowphase
 from rigidimpulse.collision.geometry import compile_shape
 from rigidimpulse.core.errors import SceneError, unknown_name
-from rigidimpulse.core.portable import length, matmul
+from rigidimpulse.core.portable import dot, length, matmul
 from rigidimpulse.core.quaternion import multiply, rotate
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.engine.run import Run
-from rigidimpulse.motion.trajectory import FIXED, pose_at
+from rigidimpulse.motion.trajectory import FIXED, Trajectories, pose_at
+from rigidimpulse.recording.events import impact_table
 from rigidimpulse.scene.body import vector
 from rigidimpulse.scene.collision_filter import CollisionFilter, may_meet
 from rigidimpulse.scene.effect import SceneEffect
@@ -115,51 +116,61 @@ class Triggers:
                 may[body] = False
             reach, thick = _reach(trigger.shape), _thickness(trigger.shape)
             self._watched.append(_Watched(trigger, body, len(world.shapes) + number, reach, thick, np.flatnonzero(may)))
+        self._impacts_seen = 0
+        self._turned = np.full(world.num_bodies, np.inf)
+        self._before = _copy(run.state.trajectory)
         self.look(run.state.time, run.state.time)
 
     def look(self, begin: float, end: float) -> None:
         """Look at what happened in the step from `begin` to `end` [s]."""
+        self._note_impacts()
         for watched in self._watched:
             for i in self._near(watched, begin, end):
                 self._follow(watched, i, begin, end)
+        self._before = _copy(self._run.state.trajectory)
+
+    def _note_impacts(self) -> None:
+        """When the trajectories at the begin of the step ended: at the first impact, or where those at its end start."""
+        rows = self._run.log.impacts
+        new = impact_table(rows[min(self._impacts_seen, len(rows)) :])
+        self._impacts_seen = len(rows)
+        self._turned[:] = self._run.state.trajectory.start
+        for side in ("body_a", "body_b"):
+            np.minimum.at(self._turned, new[side], new["time"])
 
     def _near(self, watched: _Watched, begin: float, end: float) -> list[int]:
         """Bodies that may be inside or have come and gone, by bounding spheres, and those that were inside."""
-        trajectory, world = self._run.state.trajectory, self._run.world
+        trajectories, world = (self._before, self._run.state.trajectory), self._run.world
         i = watched.may
         if not np.isfinite(watched.reach):
             return i.tolist()
-        speed, pull = np.linalg.norm(trajectory.velocity[i], axis=1), np.linalg.norm(trajectory.acceleration[i], axis=1)
         # Bound of the speed of the centre in the step.
-        way = speed + pull * (end - trajectory.start[i])
+        way = np.max([_speeds(trajectory, i, end) for trajectory in trajectories], axis=0)
         centre, _ = self._pose(watched, end)
         own = watched.body
         if own >= 0:
             away = np.linalg.norm(centre - self._body(own, end)[0])
-            own_speed, own_pull = np.linalg.norm(trajectory.velocity[own]), np.linalg.norm(trajectory.acceleration[own])
-            own_way = own_speed + own_pull * (end - trajectory.start[own])
             # The trigger moves with its body, and turns about its centre.
-            way = way + own_way + 2.0 * away * np.linalg.norm(trajectory.angular_velocity[own])
+            for trajectory in trajectories:
+                turn = np.linalg.norm(trajectory.angular_velocity[own])
+                way = way + _speeds(trajectory, np.array([own]), end) + 2.0 * away * turn
         place = np.array([self._body(k, end)[0] for k in i.tolist()]).reshape(-1, 3)
         near = np.linalg.norm(place - centre, axis=1) <= watched.reach + world.bound_radius[i] + way * (end - begin)
         return sorted({*i[near].tolist(), *watched.inside})
 
     def _follow(self, watched: _Watched, i: int, begin: float, end: float) -> None:
         """Find the changes of one pair."""
-        trajectory = self._run.state.trajectory
-        low = max(begin, *(float(trajectory.start[k]) for k in (i, watched.body) if k >= 0))
-        low = min(low, end)
         count = 1
-        if end > low:
+        if end > begin:
             thick = 0.5 * (watched.thickness + self._thickness[i])
-            way = (end - low) * (self._speed(i, low, end) + self._speed(watched.body, low, end, watched.reach))
+            way = (end - begin) * (self._speed(i, end) + self._speed(watched.body, end, watched.reach))
             count = int(np.clip(np.ceil(way / thick), 1, MOST_LOOKS)) if thick > 0.0 else MOST_LOOKS
-            if way == 0.0 and low <= begin:
+            if way == 0.0:
                 return
-        was, before = i in watched.inside, low
-        # The first look is spared where the last step ended with it.
-        first = 1 if low <= begin < end else 0
-        for time in np.linspace(low, end, count + 1)[first:].tolist():
+        was, before = i in watched.inside, begin
+        # The first look is spared: the last step ended with it.
+        first = 1 if begin < end else 0
+        for time in np.linspace(begin, end, count + 1)[first:].tolist():
             now = self._overlaps(watched, i, time)
             if now != was:
                 self._note(watched, i, self._changed(watched, i, before, time, was), now)
@@ -184,21 +195,29 @@ class Triggers:
         shape = int(self._run.world.shape_of_body[i])
         return bool(self.narrowphase.overlap(watched.shape, self._pose(watched, time), shape, self._body(i, time)))
 
-    def _speed(self, i: int, low: float, high: float, reach: float | None = None) -> float:
-        """Bound of the speed of any point of a body on its trajectory, m/s."""
-        trajectory = self._run.state.trajectory
-        if i < 0 or trajectory.mode[i] == FIXED:
+    def _speed(self, i: int, end: float, reach: float | None = None) -> float:
+        """Bound of the speed of any point of a body on the trajectories of a step, m/s."""
+        if i < 0:
             return 0.0
-        reach = float(self._run.world.bound_radius[i]) if reach is None else reach
-        fall = float(np.linalg.norm(trajectory.acceleration[i])) * (high - float(trajectory.start[i]))
-        spin = float(np.linalg.norm(trajectory.angular_velocity[i])) * (reach if np.isfinite(reach) else 0.0)
-        return float(np.linalg.norm(trajectory.velocity[i])) + fall + spin
+        reach, fastest = float(self._run.world.bound_radius[i]) if reach is None else reach, 0.0
+        for trajectory in (self._before, self._run.state.trajectory):
+            if trajectory.mode[i] != FIXED:
+                spin = float(np.linalg.norm(trajectory.angular_velocity[i])) * (reach if np.isfinite(reach) else 0.0)
+                fastest = max(fastest, float(_speeds(trajectory, np.array([i]), end)[0]) + spin)
+        return fastest
 
     def _body(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Principal frame of a body."""
-        x, q = np.empty(3), np.empty(4)
-        pose_at(self._run.state.trajectory, i, max(time, float(self._run.state.trajectory.start[i])), x, q)
-        return x, q / length(q)
+        trajectory, turned = self._run.state.trajectory, float(self._turned[i])
+        start = float(trajectory.start[i])
+        if time >= start:
+            return _pose_on(trajectory, i, time)
+        if time <= turned:
+            return _pose_on(self._before, i, time)
+        (x_0, q_0), (x_1, q_1) = _pose_on(self._before, i, turned), _pose_on(trajectory, i, start)
+        share = (time - turned) / (start - turned)
+        q = (1.0 - share) * q_0 + share * (q_1 if dot(q_0, q_1) >= 0.0 else -q_1)
+        return (1.0 - share) * x_0 + share * x_1, q / length(q)
 
     def _pose(self, watched: _Watched, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Frame of a trigger."""
@@ -207,6 +226,24 @@ class Triggers:
             return position, turn
         x, q = self._run.world.body_pose(watched.body, *self._body(watched.body, time))
         return x + rotate(q, position), multiply(q, turn)
+
+
+def _copy(trajectory: Trajectories) -> Trajectories:
+    """The trajectories as they are now."""
+    return Trajectories(*(array.copy() for array in trajectory))
+
+
+def _speeds(trajectory: Trajectories, i: np.ndarray, end: float) -> np.ndarray:
+    """Bounds (k,) of the speeds of the centres of bodies (k,) on their trajectories until `end` [s], m/s."""
+    speed, pull = np.linalg.norm(trajectory.velocity[i], axis=1), np.linalg.norm(trajectory.acceleration[i], axis=1)
+    return speed + pull * np.maximum(end - trajectory.start[i], 0.0)
+
+
+def _pose_on(trajectory: Trajectories, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
+    """Principal frame of body i on a trajectory, which has begun by `time` [s] or begins later."""
+    x, q = np.empty(3), np.empty(4)
+    pose_at(trajectory, i, max(time, float(trajectory.start[i])), x, q)
+    return x, q / length(q)
 
 
 def _corners(shape: Shape) -> tuple[np.ndarray, np.ndarray] | None:

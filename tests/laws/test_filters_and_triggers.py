@@ -71,6 +71,19 @@ def test_a_shot_through_a_thin_gate() -> None:
     assert np.allclose(overlaps(ri.simulate(scene, 0.1), "gate", "shot"), [0.985 / 200, 1.015 / 200], rtol=0, atol=SHARP)
 
 
+@pytest.mark.parametrize("restitution", [0.0, 1.0])
+@pytest.mark.parametrize("place", [9.0, 9.2, 9.4, 9.6])
+def test_a_shot_through_a_gate_that_hits_a_wall_in_the_same_step(restitution: float, place: float) -> None:
+    """100 m/s, 1.7 m a step: what was on the trajectory before the impact was not looked at, so that no overlap was reported at all."""
+    scene = ri.Scene(gravity=(0, 0, 0), bodies=[ri.Body("wall", ri.Shape.box((1, 5, 5)), motion="static", position=(10.5, 0, 0))])
+    material = ri.Material(restitution=restitution)
+    scene.add(ri.Body("shot", ri.Shape.sphere(0.1), velocity=(100, 0, 0), material=material))
+    scene.add(ri.Trigger("gate", ri.Shape.box((0.05, 1, 1)), position=(place, 0, 0)))
+    there = [(place - 0.125) / 100, (place + 0.125) / 100]
+    back = [0.198 - there[1], 0.198 - there[0]] if restitution else []
+    assert np.allclose(overlaps(ri.simulate(scene, 0.3), "gate", "shot"), there + back, rtol=0, atol=SHARP)
+
+
 def test_a_trigger_on_a_body() -> None:
     """It hangs 1 m ahead of a turning arm: a post at (0, 1, 0) is met a quarter of a turn later. Its own body is not reported."""
     spin, reach = 2.0, 0.1
