@@ -378,3 +378,30 @@ def test_a_gltf_with_its_buffer_inside_is_the_same(tmp_path: Path) -> None:
     file.mesh()
     first, second = (ri.load_scene(file.save(tmp_path / name)) for name in ("a.glb", "a.gltf"))
     assert np.array_equal(first["it"].shape.vertices, second["it"].shape.vertices)
+
+
+def test_what_is_below_a_mirrored_node_is_mirrored(tmp_path: Path) -> None:
+    """Lines of axes, velocities, spins and sliding limits, by the mirror x -> -x of what they are without it; a ball stays a ball."""
+    kept = [
+        {"linearAxes": [0], "min": -0.1, "max": 0.4}, {"linearAxes": [1, 2], "min": 0, "max": 0}, {"angularAxes": [0], "min": -1, "max": 2},
+    ]  # fmt: skip
+    scenes = []
+    for side in (1, -1):
+        moves = {"linearVelocity": [1, 2, 3], "angularVelocity": [3, 0, -1]}
+        nodes = [
+            {"name": "above", "scale": [side, 1, 1], "children": [1, 2, 3]},
+            {"name": "wheel", "rotation": TURN, "extensions": physics(moves, shaped(1)), "children": [4]},
+            {"name": "ball", "rotation": TURN, "translation": [4, 0, 0], "extensions": physics({}, shaped())},
+            {"name": "slide", "rotation": TURN, "extensions": {"KHR_physics_rigid_bodies": {"joint": {"connectedNode": 4, "joint": 0}}}},
+            {"name": "end"},
+        ]
+        scenes.append(load(with_physics(nodes, [BALL, BOX], physicsJoints=[{"limits": kept}]), tmp_path))
+    plain, mirrored = scenes
+    mirror = np.array([-1.0, 1.0, 1.0])
+    assert np.allclose(mirrored["wheel"].velocity, mirror * plain["wheel"].velocity)
+    # A spin is no arrow: its parts along the mirror turn round.
+    assert np.allclose(mirrored["wheel"].angular_velocity, -mirror * plain["wheel"].angular_velocity)
+    assert mirrored["ball"].shape.kind == "sphere"
+    joint, other = mirrored.effects[-1], plain.effects[-1]
+    assert np.allclose(joint.axes, -mirror * other.axes)
+    assert [(limit.lower, limit.upper) for limit in joint.limits] == [(-0.4, 0.1), (0.0, 0.0), (-1.0, 2.0)]

@@ -96,7 +96,7 @@ class BodyMaker:
             # Before its first key a node is where that has it.
             values |= {"position": places[0], "orientation": turns[0]}
             if release is not None:
-                values = self._with_mass(name, motion or Motion(), shape, values) | {"release_time": release}
+                values = self._with_mass(node, name, motion or Motion(), shape, values) | {"release_time": release}
             return {**values, "motion": "kinematic", "keyframes": keys}
         if motion is None:
             return values
@@ -106,18 +106,20 @@ class BodyMaker:
                 "until which it follows that"
             )
         assert motion is not None
-        velocity, spin = (rotate(turn, np.array(v)) for v in (motion.linear_velocity, motion.angular_velocity))
-        values |= {"velocity": velocity, "angular_velocity": spin}
+        axes, hand = self.hierarchy.axes(node)
+        # In a mirror a turn has the other sense.
+        velocity, spin = axes @ np.array(motion.linear_velocity), hand * axes @ np.array(motion.angular_velocity)
+        values |= {"velocity": rotate(turn, velocity), "angular_velocity": rotate(turn, spin)}
         if motion.center_of_mass is not None:
             stretch = to_matrix(turn).T @ self.hierarchy.world[node, :3, :3]
             values["center_of_mass"] = stretch @ np.array(motion.center_of_mass)
         if motion.is_kinematic and release is not None:
-            return self._with_mass(name, motion, shape, values) | {"motion": "kinematic", "release_time": release}
+            return self._with_mass(node, name, motion, shape, values) | {"motion": "kinematic", "release_time": release}
         if motion.is_kinematic:
             return {**values, "motion": "kinematic"}
-        return self._with_mass(name, motion, shape, values)
+        return self._with_mass(node, name, motion, shape, values)
 
-    def _with_mass(self, name: str, motion: Motion, shape: Shape, values: dict[str, Any]) -> dict[str, Any]:
+    def _with_mass(self, node: int, name: str, motion: Motion, shape: Shape, values: dict[str, Any]) -> dict[str, Any]:
         """Add the mass properties of a dynamic body, and the joints that make them infinite."""
         moments = motion.inertia_diagonal
         free = [k for k in range(3) if moments is not None and moments[k] > 0.0]
@@ -129,20 +131,21 @@ class BodyMaker:
             values["mass"] = motion.mass
         if moments is not None and free:
             x, y, z, w = motion.inertia_orientation
-            axes = to_matrix(np.array([w, x, y, z]) / max(float(np.linalg.norm((w, x, y, z))), 1e-9))
+            axes = self.hierarchy.axes(node)[0] @ to_matrix(np.array([w, x, y, z]) / max(float(np.linalg.norm((w, x, y, z))), 1e-9))
             finite = [moments[k] if k in free else max(moments) for k in range(3)]
             values["inertia"] = axes @ np.diag(finite) @ axes.T
         fill_mass(name, shape, values, self.notes)
         locked = [k for k in range(3) if moments is not None and k not in free]
         if motion.mass == 0.0 or locked:
-            self._hold(name, motion, shape, values, locked)
+            self._hold(node, name, motion, shape, values, locked)
         return values
 
-    def _hold(self, name: str, motion: Motion, shape: Shape, values: dict[str, Any], locked: list[int]) -> None:
+    def _hold(self, node: int, name: str, motion: Motion, shape: Shape, values: dict[str, Any], locked: list[int]) -> None:
         """Lock what is infinite by a joint to the world: the centre of mass, and turns about the axes of infinite inertia."""
         turn = values["orientation"]
         x, y, z, w = motion.inertia_orientation if motion.inertia_diagonal and any(motion.inertia_diagonal) else (0.0, 0.0, 0.0, 1.0)
-        axes = to_matrix(turn) @ to_matrix(np.array([w, x, y, z]) / max(float(np.linalg.norm((w, x, y, z))), 1e-9))
+        own, hand = self.hierarchy.axes(node)
+        axes = hand * to_matrix(turn) @ own @ to_matrix(np.array([w, x, y, z]) / max(float(np.linalg.norm((w, x, y, z))), 1e-9))
         limits = []
         if motion.mass == 0.0:
             values |= {"gravity_factor": 0.0, "mass": _mass_of(shape)}

@@ -76,7 +76,11 @@ class Shapes:
         assert geometry.shape is not None
         shape = self.file.entry(self.file.document.extensions.implicit.shapes, geometry.shape, "implicit shape")
         sheared = np.abs(scale - np.diag(np.diag(scale))).max() > EQUAL * np.abs(scale).max()
-        matrix = scale if sheared else np.diag(np.abs(np.diag(scale)))
+        squared = scale.T @ scale
+        # A ball that is turned or mirrored is the same ball.
+        even = shape.type == "sphere" and np.abs(squared - squared[0, 0] * np.eye(3)).max() <= EQUAL * squared[0, 0]
+        sheared = sheared and not even
+        matrix = scale if sheared else np.diag(np.sqrt(np.diag(squared)) if even else np.abs(np.diag(scale)))
         made = self._exact(shape, np.diag(matrix)) if not sheared else None
         if made is None:
             made = Shape.convex_hull(stays_finite(self.file, self._points(shape, owner) @ matrix.T, owner)), NO_TURN

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rigidimpulse.core.portable import dot, length, matmul
 from rigidimpulse.core.quaternion import from_matrix, multiply, to_matrix
 from rigidimpulse.io.gltf.container import GltfFile
 from rigidimpulse.io.gltf.schema import LARGEST, Node
@@ -82,6 +83,16 @@ class Hierarchy:
     def position(self, index: int) -> np.ndarray:
         """(3,) m, origin of a node in the world at rest."""
         return self.world[index, :3, 3]
+
+    def axes(self, index: int) -> tuple[np.ndarray, float]:
+        """Unit axes (3, 3) of a node in its rigid frame, as columns, and their hand: -1 where nodes above mirror it, else 1."""
+        matrix = matmul(to_matrix(self.turn[index]).T, self.world[index, :3, :3])
+        if not np.linalg.det(matrix) < 0.0:
+            return np.eye(3), 1.0
+        x = matrix[:, 0] / length(matrix[:, 0])
+        y = matrix[:, 1] - float(dot(matrix[:, 1], x)) * x
+        y /= length(y)
+        return np.stack([x, y, -np.cross(x, y)], axis=1), -1.0
 
     def chain(self, index: int) -> list[int]:
         """A node and its ancestors, itself first."""
