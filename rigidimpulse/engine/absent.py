@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
+from rigidimpulse.dynamics.constraints.jointed_island import JointMemory, make_memory
 from rigidimpulse.engine.exact.step_begin import make_counts
 from rigidimpulse.engine.pair_table import NEVER
 from rigidimpulse.model.island import Island
 from rigidimpulse.recording.joint_log import JointLog
 
 if TYPE_CHECKING:
-    from rigidimpulse.dynamics.constraints.jointed_island import JointMemory
     from rigidimpulse.dynamics.soft_body.track import FlexibleTrack
     from rigidimpulse.model.joint_table import Joints
+    from rigidimpulse.model.world import World
     from rigidimpulse.recording.ledger import Ledger
 
 NONE, NO_LINKS = np.zeros(0, np.int64), np.zeros((0, 2), np.int64)
@@ -27,16 +29,24 @@ def _ask_nobody(*_asked: Any, **_named: Any) -> NoReturn:
 
 
 class NoJoints:
-    """A run without joints. `are_closed`, `memory`, `moment` and `table` have no value: only islands with joints are asked for them."""
+    """A run without joints. `are_closed`, `moment` and `table` have no value: only islands with joints are asked for them."""
 
     are_closed: bool
-    memory: JointMemory
     table: Joints
     moment: np.ndarray
 
-    def __init__(self, num_bodies: int, times: np.ndarray) -> None:
+    def __init__(self, world: World, times: np.ndarray) -> None:
         """No joint is at any of the bodies; times: (f,) s of the frames."""
-        self._joined, self.log = np.zeros(num_bodies, bool), JointLog(times, [], NO_LINKS)
+        self._world, self._joined, self.log = world, np.zeros(world.num_bodies, bool), JointLog(times, [], NO_LINKS)
+
+    @property
+    def memory(self) -> JointMemory:
+        """Memory of no joints, for solvers of contacts and joints together."""
+        return self._memory
+
+    @cached_property
+    def _memory(self) -> JointMemory:
+        return make_memory(self._world.joints, self._world.inertia)
 
     def at(self, _bodies: Sequence[int] | np.ndarray) -> np.ndarray:
         """No joint is at any body."""
@@ -139,6 +149,9 @@ class NoSubstepping:
     def take_undisturbed_steps(self, _run: Any, _end: float, _until: float) -> None:
         """No step is taken: there are no members."""
 
+    def let_go(self, _bodies: np.ndarray) -> None:
+        """Nobody sleeps in an island."""
+
     def may_take(self, _bodies: np.ndarray) -> bool:
         """Nothing is handed over."""
         return False
@@ -153,7 +166,7 @@ class NoSubstepping:
     def carry_on(self, _earlier: Any, _old: np.ndarray, _new: np.ndarray) -> None:
         """Nobody will ask."""
 
-    contact_forces = begin_trajectories = _ask_nobody
+    contact_forces = begin_trajectories = solve_again = _ask_nobody
 
 
 class NoCompiledLoop:

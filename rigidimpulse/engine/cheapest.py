@@ -10,6 +10,9 @@ Times are counted in parts of about 0.1 ms: from numbers of solves, pieces and l
 with e(m) = (1 + m / 2)^1.5. The constants were fitted to scenes of the gallery and of the bench of 1 to 60 bodies. They are right to a
 factor of two or so, which is enough: where the regimes cost about the same it does not matter which is taken.
 
+Few bodies, without joints, of which neighbours have masses beyond RATIO : 1 stay exact at any cost. A ball of 300 times the mass of a ring
+on which it fell pressed it 5 % of its size into the floor, or the island gained energy; the exact regime takes one to three times as long.
+
 What sub-steps will cost is not known before they are taken: FIRST is expected. Where they turn out to cost more than WORSE times what the
 exact regime did, fewer than FEW bodies are given back, and what was measured is expected from then on. It fades by FADING a step. So a
 fast spinning top, which needs many pieces, stays exact, and a coin that rings down does not.
@@ -28,9 +31,9 @@ PIECE, LOOK, JOINTED_PIECE = 15.0, 2.5, 40.0
 JOINTED_SOLVE, FLIGHT = 13.0, 4.0
 FIRST, FIRST_JOINTED = PIECE + LOOK, JOINTED_PIECE
 WORSE, FADING, FEW = 1.5, 0.98, 8
-NOT_REFUSED, ALONE, CHEAP, SUBSTEPS_COST_MORE = map(np.int64, range(4))
+NOT_REFUSED, ALONE, CHEAP, SUBSTEPS_COST_MORE, UNLIKE = map(np.int64, range(5))
 """Why an island stays exact, or becomes so again."""
-REASONS = ("", "alone", "the exact regime costs less", "sub-steps cost more")
+REASONS = ("", "alone", "the exact regime costs less", "sub-steps cost more", "mass ratio")
 """The same in words."""
 APART, TOGETHER = -1, -2
 """What is refused by itself, and all islands without joints, which are stepped together; islands with joints go by their root."""
@@ -44,6 +47,13 @@ class Costs(NamedTuple):
     exact: np.ndarray  # (n,) what the exact regime took for the body's island when that began to be sub-stepped
     pieces: np.ndarray  # (n,) pieces of the last step that the body was stepped in
     looks: np.ndarray  # (n,) looks at contacts in them
+
+
+class Near(NamedTuple):
+    """What islands are near to, and made of, by the root of each of n bodies."""
+
+    touches: np.ndarray  # (n,) bool, something is near
+    unlike: np.ndarray  # (n,) bool, neighbours have masses beyond `regime.RATIO` : 1
 
 
 @jit
@@ -86,13 +96,13 @@ def _judge_together(costs, root, cost, was_substepped, judged_with, which, reaso
 
 
 @jit_making_arrays
-def judge_islands(costs, root, label, joined, touches, solve_count, reason):
+def judge_islands(costs, root, label, joined, near, solve_count, reason):
     """Write the reason (n,), by root, of islands that stay exact, or become so again; returns how many there are.
 
     root: (n,) of every body, -1 for those in no island. label: (n,) the sub-stepped island that a body was in, -1 for none.
-    joined: (n,) bool. touches: (n,) bool by root. solve_count: (n,) how often the exact solver dealt with each body in the last step.
+    joined: (n,) bool. near: `Near`. solve_count: (n,) how often the exact solver dealt with each body in the last step.
     """
-    number, refused = root.shape[0], 0
+    number, refused, touches = root.shape[0], 0, near.touches
     size, judged_with, cost = np.zeros(number, np.int64), np.full(number, APART, np.int64), np.zeros(number)
     has_joints, was_substepped = np.zeros(number, np.bool_), np.zeros(number, np.bool_)
     for i in range(number):
@@ -107,8 +117,9 @@ def judge_islands(costs, root, label, joined, touches, solve_count, reason):
         if size[r] > 0:
             factor = 1.0 if not has_joints[r] else JOINTED_SOLVE if touches[r] else FLIGHT
             cost[r] = factor * exact_cost(max(cost[r] / size[r], 1.0), size[r])
-            judged_with[r] = r if has_joints[r] else TOGETHER if touches[r] else APART
-            reason[r] = ALONE if judged_with[r] == APART else NOT_REFUSED
+            stays = near.unlike[r] and size[r] < FEW
+            judged_with[r] = r if has_joints[r] else TOGETHER if touches[r] and not stays else APART
+            reason[r] = NOT_REFUSED if judged_with[r] != APART else UNLIKE if touches[r] else ALONE
     _judge_together(costs, root, cost, was_substepped, judged_with, TOGETHER, reason)
     for r in range(number):
         if judged_with[r] == r:
@@ -164,9 +175,9 @@ class CheapestRegime:
         return 0.0 if joined.any() or most < 1.0 else most
 
     def refusals(
-        self, root: np.ndarray, label: np.ndarray, joined: np.ndarray, touches: np.ndarray, solve_count: np.ndarray
+        self, root: np.ndarray, label: np.ndarray, joined: np.ndarray, near: Near, solve_count: np.ndarray
     ) -> dict[int, str]:
         """Why islands stay exact, or become so again, by their root; see `judge_islands`."""
-        if not judge_islands(self.costs, root, label, joined, touches, solve_count, self._reason):
+        if not judge_islands(self.costs, root, label, joined, near, solve_count, self._reason):
             return {}
         return {r: REASONS[self._reason[r]] for r in np.flatnonzero(self._reason).tolist()}

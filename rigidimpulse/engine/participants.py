@@ -273,6 +273,10 @@ class Substepping(Protocol):
         """The islands at `time` with the sub-stepped ones that they touch."""
         ...
 
+    def let_go(self, bodies: np.ndarray, /) -> None:
+        """What held bodies (k,) holds them no more."""
+        ...
+
     def may_take(self, bodies: np.ndarray, /) -> bool:
         """Whether islands of bodies that no impulse keeps apart are handed over; they are, when they are looked at next."""
         ...
@@ -295,6 +299,10 @@ class Substepping(Protocol):
 
     def begin_trajectories(self, run: Any, pair_events: Any, /) -> None:
         """Trajectories of the members that were stepped last, to where the solver found them."""
+        ...
+
+    def solve_again(self, run: Any, members: np.ndarray, span: tuple[float, float], kept: float, /) -> Any:
+        """Step members again whose forces sub-steps did not find; their outcome, None if that does not hold them, either."""
         ...
 
 

@@ -94,7 +94,7 @@ class Run:
         self.box_max = np.empty((n, 3))
         self.solve_rows = row_solver(world.accuracy.contact_solver)
         self.error_estimate: ErrorEstimate = make_error_estimate(world, self.state.rotation)
-        self.joints: RunJoints = NoJoints(n, recorder.times)
+        self.joints: RunJoints = NoJoints(world, recorder.times)
         self.forces: RunForces = NoForces(n)
         self.soft_bodies: RunSoftBodies = NoSoftBodies(n)
         self.substepped: Substepping = NoSubstepping(n)

@@ -51,6 +51,8 @@ def simulate(
 ) -> SimulatedRecording:
     """Simulate a scene and record it. Deterministic: the same scene gives the same bits, at any frame rate.
 
+    With joints the frame rate changes round-off, because what is recorded of them is integrated to the frames.
+
     Args:
         scene: what to simulate; it is not changed.
         duration: s, >= 0.

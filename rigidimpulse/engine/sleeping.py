@@ -61,12 +61,14 @@ def stands_still(problem, constants, contacts, wrench, h):
 
 
 @jit_making_arrays
-def wake_by_contact(first, second, member, restless, bodies, mass, strength, inner):
+def wake_by_contact(first, second, member, restless, bodies, candidates):
     """Mark (n,) the members that are awake, and the sleepers that a moving member may wake over pairs (k,) that may touch.
 
     A moving body of mass m and speed v wakes sleepers up to k contacts away, k = max(1, m v / (m_0 u)), m_0: the least mass of a member,
     u = SLEEP_SPEED sqrt(g r). An impact that is shared by more bodies than that cannot move any of them faster than the sleep speed u.
+    What has just been let go has no speed yet, and wakes all that stand on it. candidates: `Candidates`, by which u and m are known.
     """
+    mass, strength, inner = candidates.mass, candidates.strength, candidates.inner
     reach, least = np.zeros(member.shape[0]), np.inf
     for i in range(member.shape[0]):
         if member[i]:
@@ -79,6 +81,8 @@ def wake_by_contact(first, second, member, restless, bodies, mass, strength, inn
                 spin += bodies.angular_velocity[i, c] ** 2
             size = np.sqrt(speed) + inner[i] * np.sqrt(spin)
             reach[i] = 1.0 + max(mass[i] * size / (least * max(SLEEP_SPEED * np.sqrt(strength[i] * inner[i]), 1e-300)), 1.0)
+            if candidates.let_go[i]:
+                reach[i] = 1.0 + member.shape[0]
     left = 0
     for i in range(member.shape[0]):
         left += member[i] and reach[i] < 1.0

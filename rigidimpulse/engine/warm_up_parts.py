@@ -32,7 +32,7 @@ from rigidimpulse.dynamics.constraints.rolling_friction import NO_ROLLING, rolli
 from rigidimpulse.dynamics.constraints.rows import change_velocities, changes_of, contact_rows, make_rows, response_to, row_velocities
 from rigidimpulse.dynamics.solvers.newton import solve_newton
 from rigidimpulse.engine.begin import make_plan, make_run
-from rigidimpulse.engine.cheapest import CheapestRegime
+from rigidimpulse.engine.cheapest import CheapestRegime, Near
 from rigidimpulse.engine.compile_scene import compile_scene
 from rigidimpulse.engine.exact.compiled_loop import CompiledLoop
 from rigidimpulse.engine.exact.energy_limit import limit_energy, note_end_energy
@@ -236,13 +236,14 @@ def _stand_beside_sub_steps(run: Run) -> None:
     label, none, links = np.array([-1, 1]), np.zeros(world.num_bodies), np.zeros((0, 2), np.int64)
     root, steady = np.zeros(world.num_bodies, np.int64), world.steady_acceleration
     candidates = Candidates(
-        world.dynamic, world.moving, ~member, world.mass, stepper.inner, steady, world.steady_strength, label, none, ~member
-    )
+        world.dynamic, world.moving, ~member, world.mass, stepper.inner, steady, world.steady_strength, label, none, ~member,
+        ~member,
+    )  # fmt: skip
     _take_undisturbed_step(run, stepper, candidates)
     gather_members(run.motion, candidates, 0.0, (1.0, 1.0), member)
-    connect_members(near, links, member, root, ~member)
+    connect_members(near, links, candidates, member, root, Near(~member, ~member))
     settle_islands(state.now, candidates, near, links, member, root, ~member, 1.0)
-    CheapestRegime(~member).refusals(root, label, ~member, member, none)
+    CheapestRegime(~member).refusals(root, label, ~member, Near(member, ~member), none)
     energies_of_islands(state.now, world.constants, members, label, np.zeros((3, 1)), np.zeros((4, world.num_bodies)))
     MemberPaths(world, label).end(run, members, 0.0)
     stepper.end_of(state.now, members, stepper.at_once, (0.0, STEP))
@@ -261,18 +262,18 @@ def _take_undisturbed_step(run: Run, stepper: ContactStepper, candidates: Candid
     world, state, n, member = run.world, run.state, run.world.num_bodies, np.array([False, True])
     choice = Choice(
         KEEPS_CHEAP, (1.0, 1.0), 1.0, run.substepped.counts, CheapestRegime(~member).costs, member.copy(), member.copy(),
-        np.zeros(n, np.int64), ~member, np.zeros((0, 2), np.int64), ~member,
+        np.zeros(n, np.int64), Near(~member, ~member), np.zeros((0, 2), np.int64), ~member,
     )  # fmt: skip
     landing = Landing(
-        world.constants, stepper.pressed, candidates.label, np.zeros((4, n)), np.zeros((n, 7)), np.zeros(n), stepper.inner, stepper.skin,
+        world.constants, candidates.label, np.zeros((4, n)), np.zeros((n, 7)), np.zeros(n), stepper.inner, stepper.skin,
     )  # fmt: skip
     is_undisturbed(state.trajectory, world.constants)
     pairs = stepper.table.pairs
     begin_undisturbed_step(choice, candidates, stepper.around, run.motion, pairs, stepper.fat_boxes.space_for(pairs), (0.0, STEP))
     stepper.load(run, np.array([1]), np.array([0]), STEP)
-    places = np.array([stepper.rank[1]]), np.zeros((1, 3)), np.zeros((1, 4)), np.zeros((1, 6)), np.zeros((3, 1))
+    reached = np.zeros((1, 3)), np.zeros((1, 4)), np.zeros((1, 6)), np.zeros((3, 1))
     recorded = run.recorder.frames, run.recorder.written
-    land_members(stepper.island, landing, run.motion, state.correction, recorded, np.array([1]), places, (0.0, STEP))
+    land_members(landing, run.motion, state.correction, recorded, np.array([1]), reached, (0.0, STEP))
 
 
 def _step_island(run: Run, sharing: Sharing | None = None) -> None:

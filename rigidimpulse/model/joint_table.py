@@ -87,7 +87,8 @@ def compile_joints(joints: list[Joint], world: World) -> Joints:
         columns["first"].append(columns["first"][-1] + len(rows))
     integers = ("body_a", "body_b", "first", "coordinate")
     types = dict.fromkeys(integers, np.int64) | {"per_mass": np.bool_}
-    arrays = (np.array(columns[f], types.get(f, float)) for f in Joints._fields)
+    shapes = {"anchor_a": (-1, 3), "anchor_b": (-1, 3), "frame_a": (-1, 3, 3), "frame_b": (-1, 3, 3)}
+    arrays = (np.array(columns[f], types.get(f, float)).reshape(shapes.get(f, -1)) for f in Joints._fields)
     return Joints(*(np.ascontiguousarray(array) for array in arrays))
 
 

@@ -137,3 +137,26 @@ def test_what_cannot_be_let_go_is_refused(change, words):
 
     with pytest.raises(ri.SceneError, match=words):
         ri.simulate(ri.Scene(bodies=[replace(carried((0, 0, 0), 0.5), **change)]), 0.1)
+
+
+def test_the_origin_of_a_turning_body_goes_straight() -> None:
+    """A door with its frame at the hinge turns by 90 degrees between two keys: the hinge stays. It moved 0.146 m."""
+    half = np.sqrt(0.5)
+    keys = ri.Keyframes([0.0, 1.0], [(0, 0, 0), (0, 0, 0)], [(1, 0, 0, 0), (half, 0, 0, half)])
+    door = ri.Shape.convex_hull([(x, y, z) for x in (0.0, 1.0) for y in (-0.02, 0.02) for z in (-1.0, 1.0)])
+    scene = ri.Scene(gravity=(0, 0, 0))
+    scene.add(ri.Body("door", door, motion="kinematic", keyframes=keys))
+    run = ri.simulate(scene, 1.0, 240.0)
+    # Chords of 0.02 rad leave the arc of the centre by 0.02^2 / 8 of its radius.
+    assert np.linalg.norm(run.position("door"), axis=1).max() < 0.5 * 0.02**2 / 8.0 * 1.01
+    assert np.linalg.norm(run.position("door")[[0, -1]], axis=1).max() < 1e-12
+
+
+@pytest.mark.parametrize("first", [-0.5, 0.0, 0.5])
+def test_a_body_with_keys_begins_where_they_have_it(first: float) -> None:
+    """Frame 0 shows the path at time 0, or the first key before it; the body's own position says nothing. It was shown at the origin."""
+    keys = ri.Keyframes([first, first + 2.0], [(1.0, 0, 0), (3.0, 0, 0)])
+    scene = ri.Scene(gravity=(0, 0, 0))
+    scene.add(ri.Body("hand", ri.Shape.box((0.8, 0.8, 0.8)), motion="kinematic", keyframes=keys))
+    run = ri.simulate(scene, 1.0, 24.0)
+    assert run.position("hand")[:, 0] == pytest.approx(np.maximum(1.0 + run.times - first, 1.0), abs=1e-12)

@@ -83,10 +83,9 @@ def test_the_top_of_a_column_pays_for_its_own_rise_alone() -> None:
 
 
 def test_motion_that_is_paid_for_a_rise_is_reported_and_the_remedy_helps() -> None:
-    """So is what the springs of the column made beside, and the balance took back: an eighth of all that moves."""
+    """The springs of the column made an eighth of all that moves beside, once. All contacts solved together make none."""
     run, top = slide_on_a_column(25, "substepped")
-    paid, taken = run.status.problems
+    (paid,) = run.status.problems
     assert (paid.kind, paid.bodies) == ("motion taken in a sub-stepped island", (top,))
-    assert taken.kind == "energy taken" and set(taken.bodies) < set(run.names) - {"floor"}
     run, top = slide_on_a_column(25, "newton")
     assert run.status.ok and abs(run.velocity(top)[-1, 0] - 0.2) < 2e-3

@@ -16,8 +16,10 @@ from rigidimpulse.engine.cheapest import (
     REASONS,
     WORSE,
     CheapestRegime,
+    Near,
     exact_cost,
 )
+from rigidimpulse.engine.regime import RATIO
 from rigidimpulse.engine.sleeping import SLEEP_SPEED
 from rigidimpulse.engine.substepped.membership import Candidates, connect_members, settle_islands
 from rigidimpulse.motion.body_state import BodyState
@@ -52,14 +54,18 @@ def random_case(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("seed", range(60))
 def test_islands_are_the_sets_that_pairs_and_joints_connect(seed: int) -> None:
     member, near, links = random_case(seed)
-    root, touches = np.empty(len(member), np.int64), np.ones(len(member), bool)
-    connect_members(near, links, member, root, touches)
+    root, islands = np.empty(len(member), np.int64), Near(np.ones(len(member), bool), np.ones(len(member), bool))
+    who, _ = candidates(np.random.default_rng(2000 + seed), member)
+    who.mass[::3] *= RATIO
+    connect_members(near, links, who, member, root, islands)
     assert np.array_equal(root < 0, ~member)
     expected = sets_of(len(member), np.vstack([near[:2].T, links]), member)
     assert sorted(map(min, expected)) == sorted(set(root[member].tolist()))
     for island in expected:
         assert {int(root[i]) for i in island} == {min(island)}
-        assert touches[min(island)] == any(a in island or b in island for a, b, _ in near.T)
+        assert islands.touches[min(island)] == any(a in island or b in island for a, b, _ in near.T)
+        inside = [(who.mass[a], who.mass[b]) for a, b, _ in near.T if a in island and b in island]
+        assert islands.unlike[min(island)] == any(max(masses) > RATIO * min(masses) for masses in inside)
 
 
 def candidates(rng: np.random.Generator, member: np.ndarray) -> tuple[Candidates, BodyState]:
@@ -75,6 +81,7 @@ def candidates(rng: np.random.Generator, member: np.ndarray) -> tuple[Candidates
         dynamic=~still, moving=~member & (rng.random(number) < 0.2), jointed=still, mass=rng.uniform(0.5, 2.0, number),
         inner=np.full(number, INNER), steady=zeros, strength=np.full(number, STRENGTH), label=np.full(number, -1),
         sleep_timer=np.where(sleepy, 2.0 * SLEEPY, 0.5 * SLEEPY), asleep=still.copy(),
+        let_go=still.copy(),
     ), now  # fmt: skip
 
 
@@ -87,9 +94,11 @@ def test_members_sleep_that_no_moving_one_can_wake(seed: int) -> None:
     rng = np.random.default_rng(1000 + seed)
     member, near, links = random_case(seed)
     number = len(member)
-    root, touches = np.empty(number, np.int64), np.zeros(number, bool)
-    connect_members(near, links, member, root, touches)
+    root = np.empty(number, np.int64)
     who, now = candidates(rng, member)
+    connect_members(near, links, who, member, root, Near(np.zeros(number, bool), np.zeros(number, bool)))
+    who.let_go[:] = member & (rng.random(number) < 0.1)
+    let_go = np.flatnonzero(who.let_go).tolist()
     driven = np.zeros(number, bool)
     driven[root[member][:1]] = bool(seed % 3 == 0)
     chosen, timer = member.copy(), who.sleep_timer
@@ -106,7 +115,7 @@ def test_members_sleep_that_no_moving_one_can_wake(seed: int) -> None:
         assert len(sleeps) == 0 and np.array_equal(chosen, member)
         return
     unit = SLEEP_SPEED * np.sqrt(STRENGTH * INNER) * who.mass[member].min()
-    reach = {i: max(who.mass[i] * now.velocity[i, 0] / unit, 1.0) for i in restless}
+    reach = {i: number if i in let_go else max(who.mass[i] * now.velocity[i, 0] / unit, 1.0) for i in restless}
     contacts = np.vstack([near[:2, near[2] > 0].T, links])
     for _ in range(number):
         for a, b in np.vstack([contacts, contacts[:, ::-1]]).tolist():
@@ -118,15 +127,18 @@ def test_members_sleep_that_no_moving_one_can_wake(seed: int) -> None:
     assert set(np.flatnonzero(sleeps).tolist()) == set(np.flatnonzero(member).tolist()) - awake
     assert set(np.flatnonzero(chosen).tolist()) == {i for i in np.flatnonzero(member).tolist() if int(root[i]) in alive}
     assert np.array_equal(who.asleep, sleeps & chosen)
+    assert not who.let_go.any()
 
 
 NONE = np.full(3, -1)
 
 
-def asked(regime: CheapestRegime, label: np.ndarray, solves: float, joined: bool = False, touches: bool = True) -> str:
+def asked(
+    regime: CheapestRegime, label: np.ndarray, solves: float, joined: bool = False, touches: bool = True, unlike: bool = False
+) -> str:  # fmt: skip
     """Why an island of three bodies stays exact, by a regime that knows it; empty where it is sub-stepped."""
-    root, flags = np.zeros(3, np.int64), np.array([touches, False, False])
-    return regime.refusals(root, label, np.full(3, joined), flags, np.full(3, solves)).get(0, "")
+    root, near = np.zeros(3, np.int64), Near(np.array([touches, False, False]), np.array([unlike, False, False]))
+    return regime.refusals(root, label, np.full(3, joined), near, np.full(3, solves)).get(0, "")
 
 
 def test_an_island_goes_to_sub_steps_where_exact_contact_costs_more() -> None:
@@ -135,6 +147,8 @@ def test_an_island_goes_to_sub_steps_where_exact_contact_costs_more() -> None:
     assert asked(CheapestRegime(np.zeros(3, bool)), NONE, costly) == ""
     assert asked(CheapestRegime(np.zeros(3, bool)), NONE, 0.98 * costly) == REASONS[2]
     assert asked(CheapestRegime(np.zeros(3, bool)), NONE, costly, touches=False) == REASONS[1]
+    assert asked(CheapestRegime(np.zeros(3, bool)), NONE, costly, unlike=True) == REASONS[4]
+    assert asked(CheapestRegime(np.ones(3, bool)), NONE, costly, joined=True, unlike=True) == ""
 
 
 @pytest.mark.parametrize("touches", [True, False])

@@ -528,8 +528,9 @@ class JointState:
     def _take_out(self, run: Run, j: int, time: float, kind: str, why: str) -> int:
         """The joint is gone."""
         self.whole[j] = False
-        pair = tuple(run.world.names[i] for i in self.bodies_of(np.array([j])))
-        run.log.note(time, kind, pair, f"{self.names[j]}{why}")
+        bodies = self.bodies_of(np.array([j]))
+        run.substepped.let_go(bodies)
+        run.log.note(time, kind, tuple(run.world.names[i] for i in bodies), f"{self.names[j]}{why}")
         self.log.note(time, np.array([j]), np.zeros((1, 3)))
         return j
 

@@ -21,7 +21,7 @@ from rigidimpulse.collision.contact_records import MEMBER, SUPPORT
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.dispatch import PairQuery
 from rigidimpulse.dynamics.energy import mechanical_energy
-from rigidimpulse.engine.cheapest import CheapestRegime
+from rigidimpulse.engine.cheapest import CheapestRegime, Near
 from rigidimpulse.engine.exact.advance import NOT_HELD
 from rigidimpulse.engine.exact.energy_limit import note_end_energy
 from rigidimpulse.engine.exact.step_begin import SolveCounts
@@ -72,6 +72,8 @@ LEAVING = 0.1
 """Part of its speed at which a fast body must leave an island that it has hit to be no part of it."""
 TOUCHES = 5.0
 """Skins within which a body at rest belongs to the island that comes near it."""
+MOST_SOLVED = 40
+"""Bodies without joints of which a step is made again with all contacts solved together, at most: that takes as long as ten steps."""
 
 
 
@@ -103,7 +105,9 @@ class SubsteppedIslands:
         self.label = np.full(world.num_bodies, -1, np.int64)
         self.sleep_timer = np.zeros(world.num_bodies)
         self.asleep = np.zeros(world.num_bodies, bool)
-        self._root, self._touches = np.zeros(world.num_bodies, np.int64), np.zeros(world.num_bodies, bool)
+        self._let_go = np.zeros(world.num_bodies, bool)
+        self._root = np.zeros(world.num_bodies, np.int64)
+        self._near_islands = Near(np.zeros(world.num_bodies, bool), np.zeros(world.num_bodies, bool))
         self._stood = np.full((world.num_bodies, 7), np.inf)
         self._taken = np.zeros(world.num_bodies, bool)
         self._auto = solver == "auto"
@@ -114,6 +118,7 @@ class SubsteppedIslands:
         self._outcomes: list[tuple[Outcome, float]] = []
         self._outcome_begin = 0.0
         self._refused: dict[str, int] = {}
+        self._solved_again, self._wedged = 0, np.zeros(world.num_bodies, bool)
 
     @cached_property
     def stepper(self) -> ContactStepper:
@@ -124,7 +129,8 @@ class SubsteppedIslands:
     @cached_property
     def _limits(self) -> tuple[float, float]:
         """Beyond what bodies are too fast for the sub-steps that all movable bodies together would have, see `is_slow`."""
-        h = self.stepper.sub_step(np.flatnonzero(self._world.dynamic))
+        # What is carried and let go later is among them.
+        h = self.stepper.sub_step(np.flatnonzero([body.becomes_dynamic for body in self._world.scene.bodies]))
         return FAST / h, SPIN / h
 
     @cached_property
@@ -133,7 +139,7 @@ class SubsteppedIslands:
         world = self._world
         return Candidates(
             world.dynamic, world.moving, self._jointed, world.mass, self.stepper.inner, world.steady_acceleration, world.steady_strength,
-            self.label, self.sleep_timer, self.asleep,
+            self.label, self.sleep_timer, self.asleep, self._let_go,
         )  # fmt: skip
 
     @property
@@ -159,6 +165,10 @@ class SubsteppedIslands:
             return not self.hand_over.cheapest.may_begin(solve_count, int(np.count_nonzero(self._world.dynamic)), self._jointed)
         return self._auto and not may_begin(self.counts.most, self._jointed, solve_count)
 
+    def let_go(self, bodies: np.ndarray) -> None:
+        """What held bodies (k,) holds them no more: they and what stands on them do not sleep on."""
+        self._let_go[bodies], self.sleep_timer[bodies] = True, 0.0
+
     def may_take(self, bodies: np.ndarray) -> bool:
         """Whether islands of bodies that no impulse keeps apart are handed over, see `HandOver.may_take`."""
         return self.hand_over.may_take(bodies)
@@ -170,7 +180,8 @@ class SubsteppedIslands:
         if times := self.hand_over.times_handed_over():
             text += f", {times} times handed over by the exact regime in the middle of a step"
         if self._joint_stepper is not None:
-            text += f", {self._joint_stepper.halved} sub-steps halved so that joints close"
+            text += f", {self._joint_stepper.halved} sub-steps halved so that joints close" if self._jointed.any() else ""
+            text += f", {self._solved_again} steps made again with all contacts solved together" if self._solved_again else ""
         return f"{text}; left to the exact regime, islands times steps: {refused}" if refused else text
 
     @cached_property
@@ -181,10 +192,10 @@ class SubsteppedIslands:
         cheapest = cheapest or CheapestRegime(self._jointed)
         choice = Choice(
             rule, self._limits, self._rest, self.counts, cheapest.costs, self._taken,
-            np.zeros(n, bool), self._root, self._touches, np.zeros((0, 2), np.int64), np.zeros(n, bool),
+            np.zeros(n, bool), self._root, self._near_islands, np.zeros((0, 2), np.int64), np.zeros(n, bool),
         )  # fmt: skip
         landing = Landing(
-            world.constants, self.stepper.pressed, self.label, np.zeros((4, n)), self._stood, self.sleep_timer, self.stepper.inner,
+            world.constants, self.label, np.zeros((4, n)), self._stood, self.sleep_timer, self.stepper.inner,
             self.stepper.skin,
         )  # fmt: skip
         return UndisturbedSteps(self.stepper, self._paths, self._candidates, choice, cheapest, landing)
@@ -195,7 +206,7 @@ class SubsteppedIslands:
         Returns the pairs of a step that has begun and that the loop must finish; else None.
         """
         # Nobody looks at the run between such steps, and members without joints are asked for.
-        watched = run.plan.observe or run.soft_bodies.moves or self._jointed.any()
+        watched = run.plan.observe or run.soft_bodies.moves or self._jointed.any() or self._wedged.any()
         if watched or not self._taken.any() or not is_undisturbed(run.state.trajectory, self._world.constants):
             return None
         with run.plan.clock(NAME):
@@ -217,6 +228,7 @@ class SubsteppedIslands:
             let_fly(trajectory, left, world.steady_acceleration)
             self.sleep_timer[left] = 0.0
         self._taken &= chosen
+        self._wedged &= chosen
         self.asleep &= chosen
         pair_events.inside |= chosen
         pair_events.asleep |= (self.label >= 0) & (trajectory.mode == FIXED)
@@ -237,7 +249,7 @@ class SubsteppedIslands:
             member[woken] = True
             near = self.stepper.near(run, member, pair_events.end - time)
         links = run.joints.links()
-        connect_members(near, links, member, root, self._touches)
+        connect_members(near, links, candidates, member, root, self._near_islands)
         joined = np.zeros_like(member)
         if self._jointed.any():
             joined[run.joints.bodies_of(run.joints.at(np.flatnonzero(member & self._jointed)))] = True
@@ -260,7 +272,7 @@ class SubsteppedIslands:
         """Why islands stay exact, by their root; of tall ones see `_low`."""
         world, root = run.world, self._root
         if self.hand_over.cheapest is not None:
-            refused = self.hand_over.cheapest.refusals(root, self.label, joined, self._touches, solve_count)
+            refused = self.hand_over.cheapest.refusals(root, self.label, joined, self._near_islands, solve_count)
         else:
             moves = lively(run.state.now, world.steady_strength, self.stepper.inner)
             judged = Judged(root, self.label >= 0, joined, _struck(run, joined, pair_events.begin), moves, solve_count)
@@ -469,9 +481,8 @@ class SubsteppedIslands:
         """Step members that are solved together; fresh: those of them that were in no sub-stepped island. None if joints stay open."""
         time, end = span
         which = run.joints.at(members[self._jointed[members]])
-        if len(which):
-            out = self._step_jointed(run, members, span, kept)
-        else:
+        out = self._solve(run, members, span, kept) if len(which) or self._is_wedged(members) else None
+        if out is None and not len(which):
             self._load(run, members, time, end - time, kept)
             if len(fresh):
                 self.stepper.look(run)
@@ -480,6 +491,8 @@ class SubsteppedIslands:
                 change = mechanical_energy(run.state.now, run.world.constants, members) - before
                 run.log.account(time, "position correction", change)
             out = self.stepper.step(run, time, end)
+            if not out.is_found:
+                out = self.solve_again(run, members, span, kept) or out
         if self.hand_over.cheapest is not None:
             self.hand_over.cheapest.note(members, self.stepper.parts)
         if out is None:
@@ -497,8 +510,19 @@ class SubsteppedIslands:
         members = (part[pairs.first] == MEMBER) | (part[pairs.second] == MEMBER)
         return not len(run.joints.supports_of(which)) and not np.any(held & members)
 
-    def _step_jointed(self, run: Run, members: np.ndarray, span: tuple[float, float], kept: float) -> Outcome | None:
-        """Step an island with joints; None if no sub-steps hold it."""
+    def solve_again(self, run: Run, members: np.ndarray, span: tuple[float, float], kept: float) -> Outcome | None:
+        """Step members without joints again, whose forces sub-steps did not find; None if they are many, or not held so, either."""
+        self._wedged[members] = len(members) <= MOST_SOLVED
+        out = self._solve(run, members, span, kept) if self._is_wedged(members) else None
+        self._solved_again += out is not None
+        return out
+
+    def _is_wedged(self, members: np.ndarray) -> bool:
+        """Whether sub-steps did not find the forces of such members since they came together, and are not likely to."""
+        return bool(self._wedged[members].any()) and len(members) <= MOST_SOLVED
+
+    def _solve(self, run: Run, members: np.ndarray, span: tuple[float, float], kept: float) -> Outcome | None:
+        """Step an island with all its contacts and joints solved together; None if no sub-steps hold it."""
         if self._joint_stepper is None:
             prepare_kernels(self._world, with_events=False, with_substepped=True)
             self._joint_stepper = JointedStepper(run, self.stepper)

@@ -153,6 +153,7 @@ at once, as finely, it gains up to 1e-2 of a domino's from what hits it in the m
 class Outcome:
     """Result of a step: bodies (k,) of the scene in the solver's order, and their poses and velocities (k, 6) at its end.
 
+    is_found: whether the balance had to take little, so that the forces are the right ones.
     rank: (k,) of the bodies. waypoints: of these bodies, if frames fall into the step.
     energies: (3, k) J. taken, raised: what the balance of energy took off their speeds, and what they gained and could not pay.
     given: work of drives and moving supports in islands with joints.
@@ -165,6 +166,7 @@ class Outcome:
     velocity: np.ndarray
     energies: np.ndarray
     waypoints: Waypoints | None
+    is_found: bool = True
 
     @property
     def places(self) -> tuple[np.ndarray, ...]:
@@ -624,16 +626,12 @@ class ContactStepper:
 
     def step(self, run: Run, begin: float, end: float) -> Outcome:
         """Step what was loaded from `begin` to `end`, s."""
-        out = self.advance(run, begin, end)
-        unload_pressed(self.island, *out.places, self.pressed)
-        out.energies[GIVEN] = 0.0
-        return out
-
-    def advance(self, run: Run, begin: float, end: float) -> Outcome:
-        """The same, where members are yet to be unloaded; space for where they are."""
         has_frames = self.begin_step(run, begin, end)
         self._go_on(run, END)
-        return self._outcome(self._waypoints if has_frames else None)
+        out = self._outcome(self._waypoints if has_frames else None)
+        out.is_found = bool(unload_pressed(self.island, *out.places, self.pressed))
+        out.energies[GIVEN] = 0.0
+        return out
 
     def step_by(self, run: Run, solve: Callable[[int, float], None]) -> None:
         """Step what was set up, and begun, with another solver; solve: makes as many sub-steps of such a length, s, and waypoints."""

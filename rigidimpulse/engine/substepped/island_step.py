@@ -17,7 +17,7 @@ from rigidimpulse.core.kernels import jit
 from rigidimpulse.dynamics.energy import add_kinetic, kinetic_energy, mechanical_energy
 from rigidimpulse.dynamics.solvers.tgs_soft.bodies import load_bodies
 from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import note_pressed
-from rigidimpulse.dynamics.solvers.tgs_soft.energy_balance import begin_balance, end_balance
+from rigidimpulse.dynamics.solvers.tgs_soft.energy_balance import begin_balance, end_balance, takes_little
 from rigidimpulse.engine.substepped.stages import pieces_of
 
 STRENGTH, SKIN, RATIO, MOTION, PIECES, APPROACH, DEMANDS = range(7)
@@ -77,7 +77,8 @@ def load_island(island, pairs, around, motion, ahead, demands):
 def unload_island(island, at, position, orientation, velocity, energies):
     """Balance the energy of a step, and write poses (k, 3), (k, 4) and velocities (k, 6) of members `at` their ranks (k,).
 
-    energies: (3, k) J, see TAKEN. Sub-steps must not make energy beyond what moving supports and drives gave.
+    energies: (3, k) J, see TAKEN. Sub-steps must not make energy beyond what moving supports and drives gave. Returns whether hardly any of
+    it had to be taken (`takes_little`).
     """
     bodies, balance = island.bodies, island.balance
     for k in range(at.shape[0]):
@@ -92,13 +93,14 @@ def unload_island(island, at, position, orientation, velocity, energies):
         for c in range(6):
             velocity[k, c] = bodies.velocity[8 * i + c]
         energies[TAKEN, k], energies[RAISED, k] = balance.taken[i], balance.raised[i]
+    return takes_little(balance, bodies, island.weights, at)
 
 
 @jit
 def unload_pressed(island, at, position, orientation, velocity, energies, pressed):
     """The same of an island without joints; says in pressed (n,) by index on whom contacts acted last."""
     note_pressed(island.bodies, island.order, pressed)
-    unload_island(island, at, position, orientation, velocity, energies)
+    return unload_island(island, at, position, orientation, velocity, energies)
 
 
 @jit

@@ -16,6 +16,7 @@ import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.union_find import root_of, unite
+from rigidimpulse.engine.regime import RATIO
 from rigidimpulse.engine.sleeping import wake_by_contact
 from rigidimpulse.engine.substepped.trajectories import is_slow
 from rigidimpulse.motion.evaluate import bring
@@ -23,7 +24,7 @@ from rigidimpulse.motion.trajectory import FIXED, LINEAR
 
 
 class Candidates(NamedTuple):
-    """What is known of n bodies where members are chosen; the last three vary."""
+    """What is known of n bodies where members are chosen; the last four vary."""
 
     dynamic: np.ndarray  # (n,) bool
     moving: np.ndarray  # (n,) bool, with a path of its own
@@ -35,6 +36,7 @@ class Candidates(NamedTuple):
     label: np.ndarray  # (n,) the island that a body belongs to, -1 for none
     sleep_timer: np.ndarray  # (n,) s
     asleep: np.ndarray  # (n,) bool
+    let_go: np.ndarray  # (n,) bool, since the last step: bodies that something held
 
 
 @jit
@@ -65,14 +67,16 @@ def gather_members(motion, candidates, time, limits, member):
 
 
 @jit
-def connect_members(near, links, member, root, touches):
+def connect_members(near, links, candidates, member, root, islands):
     """Write the root (n,) of the island of each member, -1 of others, and mark (n,), by root, islands that something is near.
 
-    near: (3, k) pairs of bodies that may meet, see `FatBoxes.near`; links: (m, 2) bodies that joints join.
+    Mark those, too, that have neighbours of masses beyond RATIO : 1. near: (3, k) pairs of bodies that may meet, see `FatBoxes.near`;
+    links: (m, 2) bodies that joints join; islands: `cheapest.Near`.
     """
+    touches, unlike = islands
     number = root.shape[0]
     for i in range(number):
-        root[i], touches[i] = i, False
+        root[i], touches[i], unlike[i] = i, False, False
     for k in range(near.shape[1]):
         if member[near[0, k]] and member[near[1, k]]:
             unite(root, near[0, k], near[1, k])
@@ -85,6 +89,9 @@ def connect_members(near, links, member, root, touches):
     for k in range(near.shape[1]):
         a, b = root[near[0, k]], root[near[1, k]]
         touches[a if a >= 0 else b] = True
+        if a >= 0 and b >= 0:
+            first, second = candidates.mass[near[0, k]], candidates.mass[near[1, k]]
+            unlike[a] = unlike[a] or max(first, second) > RATIO * min(first, second)
 
 
 @jit_making_arrays
@@ -155,6 +162,7 @@ def settle_islands(now, candidates, near, links, chosen, root, driven, rest):
             all_are = all_are and restless[i] == chosen[i]
     if all_are:
         candidates.asleep[:] = False
+        candidates.let_go[:] = False
         return np.zeros(0, np.bool_)
     count, first, second = 0, np.empty(near.shape[1] + links.shape[0], np.int64), np.empty(near.shape[1] + links.shape[0], np.int64)
     for k in range(near.shape[1]):
@@ -164,7 +172,8 @@ def settle_islands(now, candidates, near, links, chosen, root, driven, rest):
     for k in range(links.shape[0]):
         first[count], second[count] = links[k, 0], links[k, 1]
         count += 1
-    awake = wake_by_contact(first[:count], second[:count], chosen, restless, now, candidates.mass, candidates.strength, candidates.inner)
+    awake = wake_by_contact(first[:count], second[:count], chosen, restless, now, candidates)
+    candidates.let_go[:] = False
     _spread_over_joints(links, chosen, awake)
     sleeps, alive = np.empty(number, np.bool_), np.zeros(number, np.bool_)
     for i in range(number):

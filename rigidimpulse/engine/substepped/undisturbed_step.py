@@ -10,11 +10,11 @@ from rigidimpulse.collision.contact_records import MEMBER, SUPPORT
 from rigidimpulse.collision.fat_boxes import near_pairs
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.sorted_values import place_in
-from rigidimpulse.engine.cheapest import Costs, judge_islands
+from rigidimpulse.engine.cheapest import Costs, Near, judge_islands
 from rigidimpulse.engine.exact.step_begin import SolveCounts, begin_counts
 from rigidimpulse.engine.regime import KEPT
 from rigidimpulse.engine.sleeping import advance_sleep_timers
-from rigidimpulse.engine.substepped.island_step import GIVEN, energies_of_islands, unload_pressed
+from rigidimpulse.engine.substepped.island_step import energies_of_islands
 from rigidimpulse.engine.substepped.membership import connect_members, gather_members, settle_islands
 from rigidimpulse.engine.substepped.trajectories import depart
 from rigidimpulse.model.world import BodyConstants
@@ -38,7 +38,7 @@ class Choice(NamedTuple):
     taken: np.ndarray  # (n,) bool, members that sub-steps have taken over from the exact regime
     member: np.ndarray  # (n,) bool, who is stepped
     root: np.ndarray  # (n,) scratch
-    touches: np.ndarray  # (n,) bool, scratch
+    islands: Near  # scratch
     no_links: np.ndarray  # (0, 2), nothing is joined
     no_drives: np.ndarray  # (n,) bool, and nothing driven
 
@@ -47,7 +47,6 @@ class Landing(NamedTuple):
     """What is brought up to date where members of n bodies have been stepped, and what that depends on."""
 
     constants: BodyConstants
-    pressed: np.ndarray  # (n,) bool, see `unload_pressed`
     label: np.ndarray  # (n,)
     energies: np.ndarray  # (4, n) J, see `energies_of_islands`
     stood: np.ndarray  # (n, 7), see `advance_sleep_timers`
@@ -76,7 +75,7 @@ def _stay_cheap(choice, candidates):
     for i in range(number):
         before[0, i], before[1, i], before[2, i], before[3, i] = costs.limit[i], costs.exact[i], costs.pieces[i], costs.looks[i]
         solves[i] = max(choice.counts.solves[i], 0.0)
-    if judge_islands(costs, choice.root, candidates.label, candidates.jointed, choice.touches, solves, reason) == 0:
+    if judge_islands(costs, choice.root, candidates.label, candidates.jointed, choice.islands, solves, reason) == 0:
         return True
     for i in range(number):
         costs.limit[i], costs.exact[i], costs.pieces[i], costs.looks[i] = before[0, i], before[1, i], before[2, i], before[3, i]
@@ -95,7 +94,7 @@ def _all_stay(choice, candidates):
     if choice.rule == KEEPS_CHEAP:
         return _stay_cheap(choice, candidates)
     for i in range(number):
-        if size[i] > 0 and (size[i] < KEPT if choice.rule == KEEPS_LARGE else not choice.touches[i]):
+        if size[i] > 0 and (size[i] < KEPT if choice.rule == KEEPS_LARGE else not choice.islands.touches[i]):
             return False
     return True
 
@@ -124,7 +123,7 @@ def begin_undisturbed_step(choice, candidates, around, motion, pairs, scratch, s
         if resting > 0 and ((candidates.dynamic[a] and not member[a]) or (candidates.dynamic[b] and not member[b])):
             return DISTURBED, nobody
         near[0, k], near[1, k], near[2, k] = a, b, scratch[2, k]
-    connect_members(near, choice.no_links, member, choice.root, choice.touches)
+    connect_members(near, choice.no_links, candidates, member, choice.root, choice.islands)
     if not _all_stay(choice, candidates):
         return DISTURBED, nobody
     sleeps = settle_islands(
@@ -139,19 +138,17 @@ def begin_undisturbed_step(choice, candidates, around, motion, pairs, scratch, s
 
 
 @jit
-def land_members(island, landing, motion, correction, recorded, members, places, span):
+def land_members(landing, motion, correction, recorded, members, reached, span):
     """Take what came of a piece of a step over a span (time, length) [s], and let members (k,) go there.
 
-    island: `stages.Island`; correction: (n, 6) of trajectories, which these have none of. recorded: frames, and how many of each body are
-    written: members that slept have some to write. places: `Outcome.places` of the members.
+    correction: (n, 6) of trajectories, which these have none of. recorded: frames, and how many of each body are written: members that
+    slept have some to write. reached: positions, orientations, velocities and energies of the members, see `Outcome`.
     """
-    at, position, orientation, velocity, energies = places
+    position, orientation, velocity, energies = reached
     trajectory, now, (time, length) = motion.trajectory, motion.now, span
     frames, written = recorded
     sample_paths(trajectory, members, place_in(frames.times, time), written, frames)
-    unload_pressed(island, at, position, orientation, velocity, energies, landing.pressed)
     for k in range(members.shape[0]):
-        energies[GIVEN, k] = 0.0
         for c in range(6):
             correction[members[k], c] = 0.0
     energies_of_islands(now, landing.constants, members, landing.label, energies, landing.energies)

@@ -121,12 +121,12 @@ class UndisturbedSteps:
         """Step the members beside bodies that stand still over a span [s]; kept: see `ContactStepper.load`."""
         stepper, (time, end) = self._stepper, span
         stepper.load(run, members, still, end - time, kept)
-        out = stepper.advance(run, time, end)
+        out = stepper.step(run, time, end)
+        if not out.is_found:
+            out = run.substepped.solve_again(run, members, span, kept) or out
         self._cheapest.note(members, stepper.parts)
-        recorded = run.recorder.frames, run.recorder.written
-        land_members(
-            stepper.island, self._landing, run.motion, run.state.correction, recorded, members, out.places, (time, end - time)
-        )  # fmt: skip
+        recorded, reached = (run.recorder.frames, run.recorder.written), (out.position, out.orientation, out.velocity, out.energies)
+        land_members(self._landing, run.motion, run.state.correction, recorded, out.members, reached, (time, end - time))
         way = None if out.waypoints is None else way_of(out, out.waypoints, run.state.now, span, flies=False)
         self._paths.know(out.members, self._landing.energies, span, NO_JOINTS, way)
         self._paths.steps += 1

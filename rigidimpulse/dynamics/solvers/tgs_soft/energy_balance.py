@@ -33,6 +33,10 @@ REPORTED = 0.5
 """Part of its kinetic energy from which what a body pays for its rise is reported, if it rises by a skin or more."""
 
 
+MOST_TAKEN = 0.1
+"""Part of what moves that the balance may take: more says that the forces were not found."""
+
+
 class Weights(NamedTuple):
     """Of n bodies by rank."""
 
@@ -69,6 +73,21 @@ def _energy(bodies, weights, i):
     for k in range(3):
         total -= m * weights.pull[i, k] * bodies.position[i, k]
     return kinetic, total
+
+
+@jit
+def takes_little(balance, bodies, weights, at):
+    """Whether the balance took little from members `at` their ranks (k,): no more than MOST_TAKEN of what moves, and a rise by the skin.
+
+    No if it is no number.
+    """
+    taken, allowed = 0.0, 0.0
+    for i in at:
+        pull = weights.pull[i]
+        taken += balance.taken[i]
+        allowed += MOST_TAKEN * _energy(bodies, weights, i)[0]
+        allowed += weights.mass[i] * sqrt(pull[0] ** 2 + pull[1] ** 2 + pull[2] ** 2) * bodies.skin[i]
+    return taken <= allowed
 
 
 @jit
