@@ -74,6 +74,8 @@ TOUCHES = 5.0
 """Skins within which a body at rest belongs to the island that comes near it."""
 MOST_SOLVED = 40
 """Bodies without joints of which a step is made again with all contacts solved together, at most: that takes as long as ten steps."""
+WEDGED = 8
+"""Pieces of steps for which they are stepped so, before it is tried again without."""
 
 
 
@@ -118,7 +120,7 @@ class SubsteppedIslands:
         self._outcomes: list[tuple[Outcome, float]] = []
         self._outcome_begin = 0.0
         self._refused: dict[str, int] = {}
-        self._solved_again, self._wedged = 0, np.zeros(world.num_bodies, bool)
+        self._solved_again, self._wedged = 0, np.zeros(world.num_bodies, np.int64)
 
     @cached_property
     def stepper(self) -> ContactStepper:
@@ -228,7 +230,7 @@ class SubsteppedIslands:
             let_fly(trajectory, left, world.steady_acceleration)
             self.sleep_timer[left] = 0.0
         self._taken &= chosen
-        self._wedged &= chosen
+        self._wedged[~chosen] = 0
         self.asleep &= chosen
         pair_events.inside |= chosen
         pair_events.asleep |= (self.label >= 0) & (trajectory.mode == FIXED)
@@ -480,8 +482,12 @@ class SubsteppedIslands:
     def _step(self, run: Run, members: np.ndarray, fresh: np.ndarray, span: tuple[float, float], kept: float) -> Outcome | None:
         """Step members that are solved together; fresh: those of them that were in no sub-stepped island. None if joints stay open."""
         time, end = span
-        which = run.joints.at(members[self._jointed[members]])
-        out = self._solve(run, members, span, kept) if len(which) or self._is_wedged(members) else None
+        which, out = run.joints.at(members[self._jointed[members]]), None
+        if len(which):
+            out = self._solve(run, members, span, kept)
+        elif self._is_wedged(members):
+            out = self._solve(run, members, span, kept)
+            self._wedged[members] = np.maximum(self._wedged[members] - 1, 0)
         if out is None and not len(which):
             self._load(run, members, time, end - time, kept)
             if len(fresh):
@@ -512,13 +518,15 @@ class SubsteppedIslands:
 
     def solve_again(self, run: Run, members: np.ndarray, span: tuple[float, float], kept: float) -> Outcome | None:
         """Step members without joints again, whose forces sub-steps did not find; None if they are many, or not held so, either."""
-        self._wedged[members] = len(members) <= MOST_SOLVED
-        out = self._solve(run, members, span, kept) if self._is_wedged(members) else None
+        if len(members) > MOST_SOLVED:
+            return None
+        self._wedged[members] = WEDGED
+        out = self._solve(run, members, span, kept)
         self._solved_again += out is not None
         return out
 
     def _is_wedged(self, members: np.ndarray) -> bool:
-        """Whether sub-steps did not find the forces of such members since they came together, and are not likely to."""
+        """Whether sub-steps did not find the forces of such members a short while ago, and are not likely to."""
         return bool(self._wedged[members].any()) and len(members) <= MOST_SOLVED
 
     def _solve(self, run: Run, members: np.ndarray, span: tuple[float, float], kept: float) -> Outcome | None:

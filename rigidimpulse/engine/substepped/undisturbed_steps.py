@@ -52,20 +52,21 @@ class UndisturbedSteps:
         """
         self._stepper, self._paths, self._candidates = stepper, paths, candidates
         self._choice, self._cheapest, self._landing = choice, cheapest, landing
+        self._are_found = True
 
     def take(self, run: Run, end: float, until: float) -> PairEvents | None:
         """Take steps, the first one to `end` [s], as far as `until` [s], as long as they are such; nothing but members moves so far.
 
         Returns the pairs of a step that has begun and that the loop must finish; else None.
         """
-        goes_on, last = True, perf_counter() + PATIENCE
+        goes_on, last, self._are_found = True, perf_counter() + PATIENCE, True
         while goes_on:
             begin = run.state.time
             pair_events = self._take_one(run, end)
             if pair_events is not None or run.state.time == begin or until - end <= GRID * run.world.accuracy.step:
                 return pair_events
             end = step_end.py_func(end, until, run.world.accuracy.step)
-            goes_on = perf_counter() < last and is_undisturbed(run.state.trajectory, run.world.constants)
+            goes_on = self._are_found and perf_counter() < last and is_undisturbed(run.state.trajectory, run.world.constants)
         return None
 
     def _take_one(self, run: Run, end: float) -> PairEvents | None:
@@ -84,14 +85,19 @@ class UndisturbedSteps:
             self._paths.put_to_sleep(run, stepper, np.flatnonzero(sleeps & (state.trajectory.mode != FIXED)), begin)
         pair_events = None
         if np.any(world.dynamic & ~choice.member):
-            pair_events = PairEvents(run, end)
-            pair_events.inside |= choice.member
-            pair_events.asleep |= (self._candidates.label >= 0) & (state.trajectory.mode == FIXED)
-            pair_events.find_pairs()
+            pair_events = self._look_elsewhere(run, end)
             if len(pair_events.pairs):
                 return pair_events
         self._paths.most = max(self._paths.most, int(np.count_nonzero(choice.member)))
         return self._take_pieces(run, pair_events, (begin, end))
+
+    def _look_elsewhere(self, run: Run, end: float) -> PairEvents:
+        """The pairs of a step to `end` [s] that members are not in."""
+        pair_events = PairEvents(run, end)
+        pair_events.inside |= self._choice.member
+        pair_events.asleep |= (self._candidates.label >= 0) & (run.state.trajectory.mode == FIXED)
+        pair_events.find_pairs()
+        return pair_events
 
     def _take_pieces(self, run: Run, pair_events: PairEvents | None, span: tuple[float, float]) -> PairEvents | None:
         """Step the members over a span; pair_events: of the step, if bodies rest elsewhere. Returns it if there is a pair now."""
@@ -106,9 +112,12 @@ class UndisturbedSteps:
                 kept = self._stepper.kept
             piece_end = self._stepper.end_of(run.state.now, members, self._stepper.at_once_alone, (time, end))
             self._take_piece(run, members, still, (time, piece_end), kept)
+            # Where forces were not found, the order of events goes on: it knows how such members are stepped.
+            if not self._are_found and piece_end < end:
+                pair_events = pair_events or self._look_elsewhere(run, end)
             if pair_events is not None:
                 pair_events.trajectories_changed(members, time)
-                if len(pair_events.pairs):
+                if len(pair_events.pairs) or (not self._are_found and piece_end < end):
                     pair_events.substepped_begun = True
                     if piece_end < end:
                         pair_events.wake[members] = piece_end
@@ -123,7 +132,8 @@ class UndisturbedSteps:
         stepper.load(run, members, still, end - time, kept)
         out = stepper.step(run, time, end)
         if not out.is_found:
-            out = run.substepped.solve_again(run, members, span, kept) or out
+            solved = run.substepped.solve_again(run, members, span, kept)
+            self._are_found, out = solved is None, solved or out
         self._cheapest.note(members, stepper.parts)
         recorded, reached = (run.recorder.frames, run.recorder.written), (out.position, out.orientation, out.velocity, out.energies)
         land_members(self._landing, run.motion, run.state.correction, recorded, out.members, reached, (time, end - time))
