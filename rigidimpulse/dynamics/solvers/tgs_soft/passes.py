@@ -52,7 +52,7 @@ from rigidimpulse.dynamics.solvers.tgs_soft.records import (
     Y,
 )
 
-SLIPS = 16.0
+SLIPS = 8.0
 """How many times what static friction bears a sub-step must ask for until a contact slips. A new contact bears little in its first
 sub-steps, and friction of the next ones is to stop what slides by then: boxes on a slope between both coefficients slid off it. So what
 slips by less than this times mu g h has static friction."""
