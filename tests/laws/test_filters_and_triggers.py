@@ -1,6 +1,6 @@
 """Filters and triggers in runs: what shall not meet does not, and overlap begins and ends when it does.
 
-A ball of radius r that falls from rest by h has the time sqrt(2 h / g). Times of overlap are found to 1e-9 s where the course
+A ball of radius r that falls from rest by h has the time sqrt(2 h / g). Times of overlap are found to 1e-9 s where the way
 is free; one that is only looked at where steps end would be late by up to 1/60 s, and would miss a shot through a thin gate.
 """
 

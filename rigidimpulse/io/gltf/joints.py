@@ -81,7 +81,7 @@ def _limit(limit: schema.Limit, hand: float, name: str, notes: list[str]) -> Lim
         damping = 0.0
     axes = _letters(limit.linear_axes), _letters(limit.angular_axes)
     lower, upper = limit.min, limit.max
-    if hand < 0.0 and limit.linear_axes is not None:
+    if hand < 0.0 and len(axes[0]) == 1:  # along more axes it is a distance, which has no sense
         lower, upper = None if upper is None else -upper, None if lower is None else -lower
     return Limit(*axes, lower=lower, upper=upper, stiffness=limit.stiffness, damping=damping)
 
