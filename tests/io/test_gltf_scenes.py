@@ -383,7 +383,8 @@ def test_a_gltf_with_its_buffer_inside_is_the_same(tmp_path: Path) -> None:
 def test_what_is_below_a_mirrored_node_is_mirrored(tmp_path: Path) -> None:
     """Lines of axes, velocities, spins and sliding limits, by the mirror x -> -x of what they are without it; a ball stays a ball."""
     kept = [
-        {"linearAxes": [0], "min": -0.1, "max": 0.4}, {"linearAxes": [1, 2], "min": 0, "max": 0.3}, {"angularAxes": [0], "min": -1, "max": 2},
+        {"linearAxes": [0], "min": -0.1, "max": 0.4}, {"linearAxes": [1, 2], "min": 0, "max": 0.3},
+        {"angularAxes": [0], "min": -1, "max": 2},
     ]  # fmt: skip
     scenes = []
     for side in (1, -1):
