@@ -84,8 +84,12 @@ def stop_rows(island, elapsed):
                 rows.lower[i] = rows.upper[i] = 0.0
             elif not hard:
                 rows.kind[i] = BOUNDED
-                rows.lower[i], rows.upper[i], rate = _spring_impulse(joints, j, k, weight[i], value[i], memory, elapsed[j])
-                rows.bias[i] -= rate
+                own, rate, resistance = _spring_impulse(joints, j, k, weight[i], value[i], memory, elapsed[j])
+                if resistance == 0.0:
+                    rows.lower[i] = rows.upper[i] = own
+                else:
+                    rows.lower[i], rows.upper[i], rows.softness[i] = -np.inf, np.inf, 1.0 / resistance
+                    rows.bias[i] -= rate + own / resistance
             # The impulse has the signs that the force may have; its size is not bounded.
             elif rows.kind[i] == BOUNDED:
                 rows.lower[i] = -np.inf if joints.lower[k] < 0.0 else 0.0
@@ -97,13 +101,11 @@ def stop_rows(island, elapsed):
 
 @jit
 def _spring_impulse(joints, j, k, weight, value, memory, h):
-    """Least and most impulse nu of soft row k of joint j at the end of a sub-step of length h, and the rate that it strives for."""
+    """Impulse nu of soft row k of joint j alone at the end of a sub-step of h s, its rate then, and its resistance Z; 0 if it is slow."""
     stiffness, damping = spring_of(joints, k, weight)
     rate, a = end_rate(stiffness, damping, weight, memory.start_value[k], memory.start_rate[k], value, h)
-    if not is_slow(stiffness, damping, weight, h):
-        return -np.inf, np.inf, rate
     own = (rate - memory.start_rate[k] - (a - damping * weight * joints.rate[k]) * h) / weight - 0.5 * h * memory.force[k]
-    return own, own, rate
+    return own, rate, 0.0 if is_slow(stiffness, damping, weight, h) else damping * h + stiffness * h * h
 
 
 def close_joints(island: JointedIsland, contacts: Contacts) -> bool:

@@ -17,8 +17,13 @@ The a that x(h) shows gives the velocity at the end, x'(h), and the impulse of t
     int f dt = (x'(h) - u_0 - (a - c W r) h) / W.
 
 A row that is slow over h (w h and 2 s h below SLOW) is given that impulse: rows that pull at each other then stay of second
-order, for the others' pull that grows on the way is in theirs. A faster one is stopped at x'(h), which is stable however
-stiff it is. So a soft joint is the damped oscillator it stands for, drives are implicit, and k -> infinity is the hard joint.
+order, for the others' pull that grows on the way is in theirs. A faster one, whose bodies end at the rate u, gets
+
+    int f dt - Z (u - x'(h)),     Z = c h + k h^2
+
+which is stable however stiff it is, as if it were stopped at x'(h). That alone would be wrong where rows pull at each other: of a chain
+with strong dampers each is fast, and x'(h) is the mean of its rate, but all links together fall slowly, and would gain half of their speed
+in each sub-step. So a soft joint is the damped oscillator it stands for, drives are implicit, and k -> infinity is the hard joint.
 """
 
 from math import cos, exp, expm1, sin, sqrt
