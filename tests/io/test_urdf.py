@@ -148,6 +148,31 @@ def test_the_base(tmp_path: Path) -> None:
     assert scene.names == ("trunk",) and not scene.effects and scene["trunk"].motion == "dynamic"
 
 
+def test_frames_do_not_free_the_base(tmp_path: Path) -> None:
+    """A frame fixed to a base without mass, or to another frame of it, leaves it fixed; a mass that is fixed to them frees it."""
+    base = "<link name='base'/><link name='tool0'/><link name='camera'/>"
+    frames = joint("fixed", "base", "tool0", name="one") + joint("fixed", "tool0", "camera", '<origin xyz="0 0 0.2"/>', name="two")
+    for parent in ("base", "camera"):
+        scene = ri.load_scene(save(tmp_path, base + BOB + frames + joint("continuous", parent, "bob", '<axis xyz="0 1 0"/>')))
+        assert scene.names == ("bob",)
+        run = ri.simulate(scene, 0.5, 10)
+        assert np.abs(run.position("bob") - run.position("bob")[0]).max() < 1e-9
+    scene = ri.load_scene(save(tmp_path, base + BOB + frames + joint("continuous", "base", "bob")), fixed_base=False)
+    assert scene["base"].motion == "dynamic"
+    # The trunk, 0.2 m above, carries all frames between it and the root.
+    trunk = link("trunk", 5.0, BALL) + joint("fixed", "camera", "trunk", name="three")
+    scene = ri.load_scene(save(tmp_path, base + BOB + trunk + frames + joint("continuous", "base", "bob")))
+    assert set(scene.names) == {"trunk", "bob"} and scene["trunk"].motion == "dynamic" and len(scene.effects) == 1
+    assert "link 'base' is part of 'trunk', to which it is fixed" in scene.report
+    assert ri.simulate(scene, 0.5, 10).position("trunk")[-1, 2] < -0.5
+
+
+def test_a_frame_alone_is_no_base(tmp_path: Path) -> None:
+    """Nothing moves against it, so that it is free as before."""
+    scene = ri.load_scene(save(tmp_path, "<link name='base'/><link name='tool0'/>" + joint("fixed", "base", "tool0")))
+    assert scene.names == ("base",) and scene["base"].motion == "dynamic"
+
+
 def test_who_collides(tmp_path: Path) -> None:
     """Parent and child never; links that overlap at the start neither, and the report says which."""
     turn = '<axis xyz="0 1 0"/>'

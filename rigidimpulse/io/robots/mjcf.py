@@ -4,7 +4,7 @@
     geoms of the world   static bodies
     joints of a body     one, or ways along orthogonal axes and then one turn along or across them: one `SixAxisJoint`;
                          else a chain of bodies in between, a ten-thousandth as heavy
-    geoms that collide   contype and conaffinity, excluded pairs; meshes by their hull, as in MuJoCo
+    geoms that collide   contype and conaffinity, excluded pairs, groups of bodies that are fixed to each other; meshes by their hull
     friction             the first coefficient, of two bodies the greater; the others with condim 4 and 6
 
 Sources: MuJoCo documentation, XML reference and computation.
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,7 +30,7 @@ from rigidimpulse.io.pieces import Piece, Weight, sphere_points
 from rigidimpulse.io.robots.links import Link, axis_drives, axis_frame, axis_limits, carried, filters, fixed
 from rigidimpulse.io.robots.xml import read_xml
 from rigidimpulse.scene.joint import BallJoint
-from rigidimpulse.scene.joint_six_axis import AXES, Drive, Limit, SixAxisJoint
+from rigidimpulse.scene.joint_six_axis import AXES, Limit, SixAxisJoint
 from rigidimpulse.scene.material import Material
 from rigidimpulse.scene.origin import FileOrigin
 from rigidimpulse.scene.scene import Scene
@@ -39,6 +40,8 @@ FREE, BALL, SLIDE, HINGE = range(4)
 PLANE, FIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)
 BETWEEN = 1e-4
 """Mass and inertia of bodies between the joints of one body, as a share of its own."""
+PARENTS_COLLIDE = 1 << 10
+"""Bit of MuJoCo's disableflags: who hangs from whom collides."""
 GREY, HIDDEN_GROUP = 0.5, 3
 """Colour that stands for none; groups of geoms from this one on are not shown."""
 ALONG = 1e-9
@@ -201,7 +204,9 @@ class _Reader:
                     next(other for other in links.values() if other.name == parent).take(link)
                 else:
                     joints.append(fixed(parent, link.name, link.position, f"weld of {link.name}"))
-            elif own[0].kind != FREE:
+            elif own[0].kind == FREE:
+                self._tell_unread(own[0], "free")
+            else:
                 joints += self._chain(parent, link, own, between)
         kept = [link for k, link in links.items() if carrier[k] == link.name]
         made = [*self._grounds(), *kept, *between]
@@ -212,7 +217,7 @@ class _Reader:
         scene = Scene(np.array(model.opt.gravity) if gravity is None else gravity)
         for link in made:
             scene.add(link.body(apart[link.name], self.notes))
-        for joint in (*joints, *self._equalities(carrier)):
+        for joint in (*joints, *self._equalities(carrier, {link.name for link in kept if link.motion == "dynamic"})):
             scene.add(joint)
         scene.origin = FileOrigin(tuple(dict.fromkeys(self.notes)))
         return scene
@@ -352,8 +357,10 @@ class _Reader:
             limits = [Limit("xyz", lower=0.0, upper=0.0)] if len(group) == 1 else []
             upper = self._bounds(last)[1]
             limits += [] if upper is None else [Limit(rotation="xyz", upper=upper)]
-            drives = [Drive(damping=d, rotation=axis) for axis in AXES if (d := self._figures(last)[0]) > 0.0]
-            return SixAxisJoint(parent, below, anchor=last.anchor, axes=axis_frame(last.axis), limits=limits, drives=drives, name=names)
+            # Its damping acts against the relative angular velocity, for which joints have no row: drives about three axes damp the
+            # rates of twists, which differ from it where the joint is turned far.
+            self._tell_unread(last, "ball")
+            return SixAxisJoint(parent, below, anchor=last.anchor, axes=axis_frame(last.axis), limits=limits, name=names)
         if len(group) == 1:
             damping, friction, stiffness, rest = self._figures(last)
             linear = last.kind == SLIDE
@@ -365,10 +372,12 @@ class _Reader:
 
     def _several(self, parent: str | None, below: str, group: list[_Joint], name: str) -> SixAxisJoint:
         """Return ways along orthogonal axes, and perhaps a turn about one of them, as one joint."""
-        slides = [joint for joint in group if joint.kind == SLIDE]
-        frame = [joint.axis for joint in slides]
-        frame.append(np.cross(frame[0], frame[1]) if len(frame) >= 2 else group[-1].axis)
-        axes = np.array(frame[:3]) if len(slides) == 3 or len(frame) == 3 else np.array([*frame, np.cross(frame[0], frame[1])])
+        frame = [joint.axis for joint in group if joint.kind == SLIDE]
+        if len(frame) == 1 and _parallel(frame[0], group[-1].axis):
+            axes = axis_frame(frame[0])
+        else:
+            frame += [group[-1].axis] if len(frame) == 1 else []
+            axes = np.array(frame if len(frame) == 3 else [*frame, np.cross(frame[0], frame[1])])
         if np.linalg.det(axes) < 0.0:
             axes[2] = -axes[2]
         limits, drives, free = [], [], {True: "", False: ""}
@@ -402,13 +411,20 @@ class _Reader:
         """Return damping, dry friction, stiffness of a joint and where its spring is at rest, against the start."""
         model, j = self.model, joint.index
         dof, at = int(model.jnt_dofadr[j]), int(model.jnt_qposadr[j])
-        rest = 0.0 if joint.kind == BALL else float(model.qpos_spring[at] - model.qpos0[at])
-        if joint.kind == BALL and (model.jnt_stiffness[j] or model.dof_frictionloss[dof]):
-            self.notes.append(f"joint {joint.name!r}: spring and friction of ball joints are not read")
+        rest = float(model.qpos_spring[at] - model.qpos0[at])
         return float(model.dof_damping[dof]), float(model.dof_frictionloss[dof]), float(model.jnt_stiffness[j]), rest
 
+    def _tell_unread(self, joint: _Joint, kind: str) -> None:
+        """Note what a joint says that no joint of a scene can do; kind: what the line calls it."""
+        model, j = self.model, joint.index
+        dof = int(model.jnt_dofadr[j])
+        figures = {"damping": model.dof_damping[dof], "stiffness": model.jnt_stiffness[j], "frictionloss": model.dof_frictionloss[dof]}
+        unread = ", ".join(f"{name} = {value:g}" for name, value in figures.items() if value)
+        if unread:
+            self.notes.append(f"joint {joint.name!r}: {unread} of a {kind} joint is not read: it moves without")
+
     def _apart(self, links: list[Link]) -> list[tuple[str, str]]:
-        """Return pairs of links that do not collide by contype, conaffinity and excluded pairs."""
+        """Return pairs of links that do not collide: by contype and conaffinity, excluded pairs, and what is fixed to each other."""
         model, bits = self.model, dict(self.ground_bits)
         for k in range(1, model.nbody):
             geoms = range(int(model.body_geomadr[k]), int(model.body_geomadr[k] + model.body_geomnum[k]))
@@ -419,14 +435,31 @@ class _Reader:
         apart = [
             (a, b) for j, b in enumerate(named) for a in named[:j] if not (bits[a][0] & bits[b][1] or bits[b][0] & bits[a][1])
         ]  # fmt: skip
-        apart += self._chained
+        apart += [*self._chained, *self._in_one_group()]
         for signature in model.exclude_signature.tolist():
             apart.append((self.names[signature >> 16], self.names[signature & 0xFFFF]))
         known = set(named)
         return [(a, b) for a, b in apart if a in known and b in known]
 
-    def _equalities(self, carrier: dict[int, str | None]) -> Iterator[Any]:
-        """Yield joints for the equality constraints connect and weld of bodies; list the others."""
+    def _in_one_group(self) -> list[tuple[str, str]]:
+        """Return pairs of bodies that are fixed to each other, or the one to a body that the other one's group hangs from by a joint.
+
+        MuJoCo's contacts leave these out (Computation, Collision detection), so that robots may be drawn with parts that overlap. What
+        hangs from the world does collide with all that is fixed to the world.
+        """
+        model, pairs = self.model, []
+        group = model.body_weldid.tolist()
+        above = [group[parent] for parent in model.body_parentid[group].tolist()]
+        by_parent = not model.opt.disableflags & PARENTS_COLLIDE
+        for b in range(1, model.nbody):
+            for a in range(1, b):
+                hangs = by_parent and group[a] != 0 != group[b] and (group[a] == above[b] or group[b] == above[a])
+                if hangs or group[a] == group[b]:
+                    pairs.append((self.names[a], self.names[b]))
+        return pairs
+
+    def _equalities(self, carrier: dict[int, str | None], moving: set[str]) -> Iterator[Any]:
+        """Yield joints for the equality constraints connect and weld of bodies; list the others. moving: names of bodies that do."""
         model = self.model
         for e in range(model.neq):
             kind, first, second = int(model.eq_type[e]), int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
@@ -435,8 +468,42 @@ class _Reader:
                 self.notes.append(f"equality constraint {name!r} is not read: of those only active connect and weld of bodies are")
                 continue
             a, b = carrier[first], carrier[second]
+            if a == b or not moving & {a, b}:
+                self.notes.append(f"equality constraint {name!r} is not read: its bodies do not move against each other")
+                continue
             anchor = np.array(self.data.xpos[first]) + to_matrix(np.array(self.data.xquat[first])) @ np.array(model.eq_data[e][:3])
-            yield BallJoint(a, b, anchor, name=name) if kind == 0 else fixed(a, b or "", np.array(self.data.xpos[second]), name)
+            yield BallJoint(a, b, anchor, name=name) if kind == 0 else self._weld(e, (first, second), carrier, name)
+
+    def _weld(self, e: int, sides: tuple[int, int], carrier: dict[int, str | None], name: str) -> SixAxisJoint:
+        """Return the joint of a weld, which holds body 2 in body 1 as `relpose` says, else as they are at the start; sides: the two.
+
+        Body 2 turned by Q and displaced by d in body 1: MuJoCo keeps Q, and the place d + Q s of the weld's anchor s in body 2.
+        """
+        figures = np.array(self.model.eq_data[e])
+        turn = to_matrix(figures[6:10])
+        way = figures[3:6] - turn @ figures[:3]
+        first, second = sides
+        if carrier[second] is None:
+            # A joint has the world as its first body: that of body 1 in body 2 is the inverse pose.
+            first, second, turn = second, first, turn.T
+            way = -turn @ way
+        a, b = carrier[first], carrier[second]
+        assert b is not None
+        if figures[10] == 0.0:
+            self.notes.append(f"equality constraint {name!r}: torquescale = 0 is not read: it holds the rotation too")
+        frame, own = to_matrix(np.array(self.data.xquat[first])), to_matrix(np.array(self.data.xquat[second]))
+        position = np.array(self.data.xpos[second])
+        axes, anchor = frame @ turn, np.array(self.data.xpos[first]) + frame @ way
+        joint = fixed(a, b, position, name)
+        if np.allclose(axes, own, 0.0, ALONG) and np.allclose(anchor, position, ALONG, ALONG):
+            return joint
+        self.notes.append(f"equality constraint {name!r}: relpose is not as the bodies are at qpos0: they are moved there at the start")
+        return replace(joint, anchor=anchor, axes=axes.T, anchor_b=position, axes_b=own.T)
+
+
+def _parallel(a: np.ndarray, b: np.ndarray) -> bool:
+    """Whether two unit vectors, which are along or across each other, are along each other."""
+    return abs(float(a @ b)) > 0.5
 
 
 def _is_one(group: list[_Joint]) -> bool:

@@ -118,11 +118,22 @@ class _Reader:
         return scene
 
     def _is_fixed(self, made: dict[str, Link]) -> bool:
-        """Whether the root stands: the world itself, or a link without mass that others move against."""
+        """Whether the root stands: it is the world, or others move against it, and neither it nor what is fixed to it has mass."""
         if self.root == WORLD:
             return True
-        below = [joint for joint in self.joints.values() if self._side(joint, "parent") == self.root]
-        return made[self.root].weight is None and bool(below) and all(joint.get("type") != "fixed" for joint in below)
+        light, heavy = self._root_group(made)
+        moving = any(joint.get("type") != "fixed" and self._side(joint, "parent") in light for joint in self.joints.values())
+        return not heavy and moving
+
+    def _root_group(self, made: dict[str, Link]) -> tuple[list[str], list[str]]:
+        """Return the links without mass that are the root or fixed to it, also one by the other, and those with mass fixed to these."""
+        fast = {self._side(joint, "child"): self._side(joint, "parent") for joint in self.joints.values() if joint.get("type") == "fixed"}
+        light: list[str] = []
+        heavy: list[str] = []
+        for name in self.order:
+            if name == self.root or fast.get(name) in light:
+                (light if made[name].weight is None else heavy).append(name)
+        return light, heavy
 
     def _join(self, made: dict[str, Link], base: bool) -> tuple[list[SixAxisJoint], dict[str, str | None]]:
         """Return the joints, and the link that carries each link: itself, another one that it is a part of, None for the world."""
@@ -132,13 +143,13 @@ class _Reader:
             root.motion = "static"
             carrier[self.root] = self.root if root.pieces else None
         elif root.weight is None:
-            # A frame below the robot: the first link with mass that is fixed to it carries it.
-            fast = (self._side(joint, "child") for joint in self.joints.values()
-                    if joint.get("type") == "fixed" and self._side(joint, "parent") == self.root)  # fmt: skip
-            other = next((name for name in fast if made[name].weight is not None), None)
-            if other is not None:
-                made[other].take(root)
-                carrier |= {self.root: other, other: other}
+            # Frames below the robot: the first link with mass that is fixed to them carries them.
+            light, heavy = self._root_group(made)
+            if heavy:
+                carrier[heavy[0]] = heavy[0]
+                for name in light:
+                    made[heavy[0]].take(made[name])
+                    carrier[name] = heavy[0]
         joints: list[SixAxisJoint] = []
         for name in self.order:
             if name in carrier:
