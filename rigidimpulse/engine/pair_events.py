@@ -269,4 +269,4 @@ class PairEvents:
 
     def next_time(self) -> float:
         """Time of the earliest contact or call, inf if there is none."""
-        return float(next_time(self.table) if len(self.pairs) else self.wake.min())
+        return float(next_time(self.table) if len(self.pairs) else self.wake.min(initial=np.inf))

@@ -68,8 +68,7 @@ class Motion:
 
     def half(self) -> float:
         """Half the side of a square that the whole motion takes place above, m."""
-        places = np.concatenate([path.positions for path in self.paths.values()])
-        return 2.0 * float(np.abs(places).max(initial=0.0))
+        return 2.0 * max((float(np.abs(path.positions).max(initial=0.0)) for path in self.paths.values()), default=0.0)
 
 
 def _paths(run: Recording, scene: Scene, impact_keys: bool) -> dict[str, Path]:

@@ -32,7 +32,7 @@ def write_npz(run: Recording, target: ExportTarget) -> None:
     np.savez_compressed(
         target.path,
         times=run.times,
-        names=np.array(run.names),
+        names=np.array(run.names, np.str_),
         position=run.positions,
         orientation=run.orientations,
         velocity=run.velocities,

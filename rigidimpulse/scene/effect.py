@@ -10,3 +10,5 @@ class SceneEffect:
     """Stage of the step that it belongs to: "forces", "constrain" or "observe"."""
     kind: ClassVar[str] = ""
     """What `explain` calls all forces of the class; empty for what is no force."""
+    is_body: ClassVar[bool] = False
+    """Whether it is something that moves, so that a scene with nothing else can be simulated."""

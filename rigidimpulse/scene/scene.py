@@ -154,7 +154,7 @@ def validate(scene: Scene) -> list[BodyMass]:
 
     """
     vector(scene.gravity, "gravity", "m/s^2")
-    if not scene.bodies:
+    if not scene.bodies and not any(effect.is_body for effect in scene.effects):
         raise SceneError("the scene has no bodies", "add one: scene.add(Body('ball', Shape.sphere(0.5)))")
     for body in scene.bodies:
         body.check()

@@ -159,6 +159,85 @@ def test_sheet_has_its_stiffness_whatever_the_mesh() -> None:
     assert 0.8 < forces[-1] / (100.0 * 0.01) < 1.6
 
 
+def squares(n: int, m: int, side: float) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of n x m vertices in squares, each cut by the same diagonal."""
+    i = np.arange(n * m).reshape(n, m)
+    a, b, c, d = i[:-1, :-1].ravel(), i[1:, :-1].ravel(), i[1:, 1:].ravel(), i[:-1, 1:].ravel()
+    x, y = np.divmod(np.arange(n * m), m)
+    places = side * np.column_stack([x, y, np.zeros(n * m)])
+    return places, np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+
+
+def equilateral(n: int, m: int, side: float) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of m rows along x of n vertices each, in equilateral triangles."""
+    row, column = np.divmod(np.arange(n * m), n)
+    places = side * np.column_stack([column + 0.5 * (row % 2), np.sqrt(0.75) * row, np.zeros(n * m)])
+    faces = []
+    for j, i in np.ndindex(m - 1, n - 1):
+        a, b, c, d = n * j + i, n * j + i + 1, n * (j + 1) + i, n * (j + 1) + i + 1
+        faces += [(a, b, c), (b, d, c)] if j % 2 == 0 else [(a, b, d), (a, d, c)]
+    return places, np.array(faces)
+
+
+def rolled_energy(mesh: tuple[np.ndarray, np.ndarray], curvature: float, angle: float) -> float:
+    """Bending energy of a sheet of B = 1 N m, rolled to a cylinder along a direction, relative to B c^2 / 2 per area."""
+    x, faces = mesh
+    flat = sheet(x, faces, 1.0, 1e-12, 1.0, 0.0, 0.0)  # springs of nothing: the stretch of chords is none of bending
+    along, across = np.array([np.cos(angle), np.sin(angle), 0.0]), np.array([-np.sin(angle), np.cos(angle), 0.0])
+    turn = curvature * x @ along
+    places = np.outer(np.sin(turn) / curvature, along) + np.outer(x @ across, across)
+    places[:, 2] = (1.0 - np.cos(turn)) / curvature
+    corners = x[faces]
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    return flat.energy(places) / (0.5 * curvature**2 * area)
+
+
+@pytest.mark.parametrize("curvature", [0.003, 0.03])
+def test_rolled_sheet_has_its_flexural_rigidity(curvature: float) -> None:
+    """B c^2 / 2 per area. Edges of the rim do not bend, and they are half of one row in n - 1 rows: 1 - 1 / (n - 1) of it is there.
+
+    Squares along their sides have exactly that. Equilateral triangles have it in every direction, up to what the shape of the rim
+    changes of that row. Faces turn by up to 0.03 rad: sines of it are of order 2e-4.
+    """
+    n = 41
+    for angle in (0.0, 0.5 * np.pi):
+        assert rolled_energy(squares(n, n, 1.0), curvature, angle) == pytest.approx(1.0 - 1.0 / (n - 1), rel=1e-6)
+    for angle in np.linspace(0.0, np.pi, 13):
+        assert 1.0 - 1.0 / (n - 1) - 2e-4 < rolled_energy(equilateral(n, n, 1.0), curvature, angle) < 1.0
+
+
+def test_rolled_squares_depend_on_the_direction_of_their_diagonals() -> None:
+    """Across a direction at angle a to the sides: 1 + 2 b + 4 b^2 with b = sin(2 a) / 2, from 0.75 to 3, less what the rim lacks."""
+    n = 81
+    for angle in np.radians([-45.0, -15.0, 15.0, 30.0, 45.0, 60.0]):
+        b = 0.5 * np.sin(2.0 * angle)
+        expected = 1.0 + 2.0 * b + 4.0 * b * b
+        assert rolled_energy(squares(n, n, 1.0), 1e-3, angle) == pytest.approx(expected, rel=2.0 / (n - 1))
+
+
+@pytest.mark.parametrize(("make", "free"), [(squares, 4.0 / 5.0), (equilateral, 8.0 / 9.0)])
+def test_cantilever_strip_bends_by_its_weight(make, free: float) -> None:
+    """w = q L^4 / 8 B', with B' what B leaves to a strip whose sides are free: it also bends across, and twists.
+
+    Energy per area of hinges on curvatures a, c and twist b. Equilateral: a plate of Poisson's ratio 1/3, B' = 8/9 B. Squares:
+    B ((a + b)^2 + (c + b)^2 + 4 b^2) / 2, least at c = -b = a / 5: B' = 4/5 B. Within the half edge by which the clamp is off: 2 s / L.
+    """
+    n, bending, side = 41, 0.2, 0.01
+    x, faces = make(n, 5, side)
+    clamp = 1.01 * side
+    length = x[:, 0].max() - side
+    load = 0.05 * 8.0 * bending / length**3
+    strip = FlexibleBody(
+        "strip", x, faces, stiffness=2e4, bending=bending, damping=0.05, area_density=load / 9.81,
+        pinned=np.flatnonzero(x[:, 0] < clamp).tolist(),
+    )  # fmt: skip
+    run = Run(anchor_scene(strip), tolerance=1e-9)
+    for _ in range(60):
+        run.step(0.5)
+    tip = -run.soft_bodies.position[x[:, 0] > x[:, 0].max() - 1e-9, 2].mean()
+    assert free * tip == pytest.approx(load * length**4 / (8.0 * bending), rel=2.0 * side / length)
+
+
 def test_hanging_chain_is_where_statics_puts_it() -> None:
     """Elastic chain under its weight between two pins: forces balance in every joint; the horizontal pull and the first vertical one
     are found so that the links reach from pin to pin. Settled in long steps, kh^2/m = 1e4."""

@@ -69,6 +69,7 @@ class FlexibleBody(SceneEffect):
     gravity_factor: float = 1.0
     stage: ClassVar[str] = "forces"
     kind: ClassVar[str] = "flexible bodies"
+    is_body: ClassVar[bool] = True
 
     @classmethod
     def compile(cls, _bodies: Sequence[Self], world: World) -> ForceTable:

@@ -8,6 +8,7 @@ as much energy as a free body would get: no energy comes from nothing.
 from __future__ import annotations
 
 from copy import copy
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,16 @@ SCHEME = "midpoint"
 """Soft bodies that touch nothing fly on the parabolas of rigid bodies, and lose energy by their dampers only."""
 HARDER = 2.0
 """Times its last force that a soft body may press a body that is held, whatever the energy."""
+
+
+class SoftBodyState(NamedTuple):
+    """What a step changes, so that it can be taken back."""
+
+    soft_bodies: Flexibles
+    value: np.ndarray  # (k, 6) N, N m
+    rate: np.ndarray  # (k, 6) a second
+    span: tuple[float, float]  # s, of the last step
+    num_sums: int
 
 
 class SoftBodyForces(ForceTable):
@@ -86,6 +97,16 @@ class SoftBodyForces(ForceTable):
         self._start, self._end = time, end
         self.sums.append(self._sums())
         return done, motion.movable & np.any(done.ramp, axis=(0, 2))
+
+    def state(self) -> SoftBodyState:
+        """What a step changes."""
+        return SoftBodyState(copy(self.soft_bodies), self._value, self._rate, (self._start, self._end), len(self.sums))
+
+    def go_back(self, state: SoftBodyState) -> None:
+        """Take back the steps since then."""
+        self.soft_bodies, (self._start, self._end) = copy(state.soft_bodies), state.span
+        self._value, self._rate = state.value, state.rate
+        del self.sums[state.num_sums :]
 
     def _might_move(self, impulse: np.ndarray, h: float, motion: RigidMotion) -> np.ndarray:
         """Bodies (n,) bool that would get more energy from impulses (n, 6) than the soft bodies lost, if nothing held them.

@@ -31,8 +31,12 @@ from rigidimpulse.dynamics.soft_body.contact_terms import (
 )
 from rigidimpulse.dynamics.soft_body.mass_spring import SpringMesh
 
-MOST_ITERATIONS = 100
+MOST_ITERATIONS = 200
+"""Friction of cloth on a rim takes up to 120."""
 MOST_LINEAR = 2000
+STALLED, MOST_STALLED = 0.5, 8
+"""Part of what is broken that a round must mend, or it counts as stalled. As many in a row end the search: where planes leave no
+place, only penalties and forces grow. With 4, or with penalties that stop to grow, a cloth on a ball jammed."""
 UPDATE = 0.3
 """Error at which forces of contacts are taken over, relative to the error that this makes."""
 FLOOR = TOLERANCES.soft_body.force_round_off
@@ -118,7 +122,7 @@ def minimise(p: Problem, contacts: SoftContacts, z: np.ndarray, tolerance: float
     noise = FLOOR * p.h * np.sqrt(float(np.sum((stiffness * np.abs(z[:n]).max(initial=0.0)) ** 2 / p.soft_body.mass)) / total)
     force = np.empty_like(contacts.force)
     linear, value, previous, iteration, blind, stepped = 0, value_of(p, contacts, z), np.inf, 0, False, False
-    last = np.inf
+    last, stalled = np.inf, 0
     while True:
         gradient = _gradient(p, contacts, z, force)
         residual = np.where(held[:, None], 0.0, -gradient)
@@ -129,13 +133,14 @@ def minimise(p: Problem, contacts: SoftContacts, z: np.ndarray, tolerance: float
             noise = max(noise, error)
         goal = tolerance * p.speed + noise
         done = error <= goal and broken <= goal
-        if done or iteration == MOST_ITERATIONS:
+        if done or iteration == MOST_ITERATIONS or stalled == MOST_STALLED:
             return Solution(z, force, gradient, iteration, linear, max(error, broken), done)
         iteration += 1
         if broken > goal and (error <= goal or (stepped and error <= UPDATE * _effect(p, contacts, force, mass))):
             contacts.force[:] = force
             if broken > 0.2 * last:  # it closes in slowly: near the goal higher penalties no longer hinder the search
                 contacts.penalty[:] *= 4.0
+            stalled = stalled + 1 if broken > STALLED * last else 0
             last = broken
             pressing = np.einsum("ij,ij->i", force, contacts.normal)
             contacts.radius[:] = contacts.friction * np.maximum(pressing, 0.0)

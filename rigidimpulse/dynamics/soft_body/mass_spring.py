@@ -6,7 +6,10 @@ Dampers have c = tau k and tau kappa: every mode of frequency w is damped by the
 a sheet is a property of its material, not of its mesh: with A the area of the faces at an edge, L its length,
 
     k = E_s A / L^2     (van Gelder 1998; E_s N/m, force per width and strain: Young's modulus times thickness)
-    kappa = 3 B L^2 / A     (Grinspun et al. 2003; B N m, flexural rigidity)
+    kappa = B L^2 / A     (hinges: Grinspun et al. 2003; their stiffness: Seung, Nelson 1988; B N m, flexural rigidity)
+
+On equilateral triangles this is Seung and Nelson's 2 B / sqrt(3): a sheet that is rolled has B c^2 / 2 per area, whatever its curvature
+and direction. On squares with a diagonal it has that where it is rolled along their sides. Grinspun's own factor of 3 is no rigidity.
 
 Struts hold a closed mesh open, see `struts`.
 """
@@ -165,8 +168,8 @@ def sheet(
     left, right = edges.first[two], edges.last[two]
     opposite = np.roll(face, -2, axis=1).ravel()
     hinge = np.column_stack([spring[two], opposite[left], opposite[right]])
-    # kappa = 3 B L^2 / A.
-    hinge_stiffness = 3.0 * bending * length[two] ** 2 / edge_area[two]
+    # kappa = B L^2 / A.
+    hinge_stiffness = bending * length[two] ** 2 / edge_area[two]
     if inner > 0.0:
         strut, strut_stiffness = inner_struts(x, face, inner)
         spring, spring_stiffness = np.concatenate([spring, strut]), np.concatenate([spring_stiffness, strut_stiffness])

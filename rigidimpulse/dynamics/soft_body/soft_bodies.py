@@ -42,7 +42,7 @@ from rigidimpulse.model.world import World
 from rigidimpulse.scene.material import combine
 
 GAP = 0.01
-"""Gap at which soft bodies are kept from bodies, relative to the mean length of their edges."""
+"""Gap at which soft bodies are kept from bodies, and rest on them, relative to the mean length of their edges and struts."""
 ROUNDS = 10
 """Most times that contacts are looked for again on the way that was solved for."""
 MIDPOINT_EXCESS = TOLERANCES.soft_body.midpoint_excess
@@ -61,6 +61,7 @@ class FlexibleStep(NamedTuple):
     ramp: np.ndarray  # (2, n, 6) N, N m: force and torque at the start, and their rates per s (see the module)
     energy_taken: float  # J, motion taken off against energy out of nothing
     energy_made: float  # J, of it what no motion was left to be taken from
+    energy_turned: float  # J, what the step dealt with: the largest of its energies, and what gravity would give in it
     num_contacts: int
     converged: bool  # False: solved without friction, or not at all
     unresolved: int  # contacts still found after the last round
@@ -362,6 +363,10 @@ class Flexibles:
         work = float(np.sum((acting + hold) * way))
         kinetic = 0.5 * float(dot(soft_body.mass, dot(velocity, velocity) - dot(before, before)))
         excess = kinetic + soft_body.energy(end) - soft_body.energy(x0) - work
+        # At rest all of these are round-off; what gravity would give in a step is what the solver's errors are of.
+        falling = 0.5 * h * h * float(dot(soft_body.mass[free], dot(self._gravity[free], self._gravity[free])))
+        through = float(np.sum(np.abs((acting + hold) * way)))
+        turned = max(0.5 * float(dot(soft_body.mass, dot(before, before))) + soft_body.energy(x0), through, falling)
         if np.any(start != x0):  # the energy of the position correction is no motion's to give
             excess -= soft_body.energy(start) - soft_body.energy(x0)
         if midpoint and excess > MIDPOINT_EXCESS * float(dot(soft_body.mass, dot(velocity, velocity))):
@@ -380,7 +385,7 @@ class Flexibles:
         # F(s) = 4 J / h - 3 L + (6 L - 6 J / h) s / h: see the head of the file.
         ramp = np.stack([4.0 * given / h - 3.0 * load, 6.0 * load / h - 6.0 * given / h**2])
         self._bear(given[:, :3] / h, rigid, h)
-        return FlexibleStep(given, ramp, taken, made, len(contacts.key), solution.converged, unresolved)
+        return FlexibleStep(given, ramp, taken, made, turned, len(contacts.key), solution.converged, unresolved)
 
     def _keep_momenta(
         self, start: np.ndarray, end: np.ndarray, velocity: np.ndarray, before: np.ndarray, solved: Solved, rigid: RigidMotion, h: float
