@@ -6,9 +6,10 @@ halving the step leaves at most half of it, so e_k <= 2 d_k. That is for errors 
     e_k  ~  SAFETY max(d_k, d_(k-1) / 8) + r_k + floor
 
 where r_k is how far u_k moves when it starts with an error of rounding (`reference.perturbed`) and its impact times may be off by LOOSER
-times their tolerance. The term d_(k-1) / 8 counts where d_k is small by chance. The floor is an error that all rungs share: the rounding
-of the positions themselves and, where contacts last, the gap at which bodies rest (`tolerances.TOLERANCES.contact.margin` of a body's
-size; in sub-stepped islands the skin, relative to half a size).
+times their tolerance. The term d_(k-1) / 8 counts where d_k is small by chance. Two neighbours may be on one branch of a motion that has
+several, and far off together: so a rung is taken only if the next but one is within the bounds of it, too. The floor is an error that all
+rungs share: the rounding of the positions themselves and, where contacts last, the gap at which bodies rest
+(`tolerances.TOLERANCES.contact.margin` of a body's size; in sub-stepped islands the skin, relative to half a size).
 """
 
 from __future__ import annotations
@@ -80,25 +81,37 @@ def _within(run: Callable[..., SimulatedRecording], scene: Scene, duration: floa
         """What rounding and tolerance do to a rung; asked only of one that might do."""
         return _apart(runs[level], run(_looser(settings[level]), until, perturbed(scene)))
 
+    passed = -1  # the rung that is within the bounds as far as the next one says
     for level in range(1, LAST_RUNG + 1):
         settings.append(rung(level))
         runs.append(run(settings[-1], until))
         steps.append(_apart(runs[-2], runs[-1]))
         errors.append(_estimate(steps, np.zeros(2), runs[-2]))
+        if passed >= 0:
+            if (wide := _widened(errors[passed], _apart(runs[passed], runs[-1]) + _floor(runs[passed]))).within(target):
+                break
+            errors[passed], passed = wide, -1
         if not Estimate(*_floor(runs[-2]).tolist()).within(target):
             break  # finer steps would not help
         if errors[-1].within(target):
             errors[-1] = _estimate(steps, drifted := drift(level - 1), runs[-2])
-            if errors[-1].within(target) or drifted.max() >= steps[-1].max():
-                break  # it will do, or it is about as good as rounding lets it be
-    best = len(errors) - 1
-    if not errors[best].within(target):
+            if errors[-1].within(target):
+                passed = level - 1
+            elif drifted.max() >= steps[-1].max() and settings[-2].accuracy.tolerance <= rung(LAST_RUNG).accuracy.tolerance:
+                break  # it is about as good as rounding lets it be
+    best = passed
+    if best < 0:
         best = int(np.argmin([error.position for error in errors]))
         errors[best] = _estimate(steps[: best + 1], drift(best), runs[best])
     tries = [Try(setting.accuracy, _seconds(made), error) for setting, made, error in zip(settings, runs, [*errors, UNKNOWN], strict=True)]
-    how = "from a run with half the step, and one started off by rounding"
+    how = "from runs with a half and a quarter of the step, and one started off by rounding"
     choice = Choice(target, settings[best].accuracy, errors[best].within(target), errors[best], until, how, tuple(tries))
     return (runs[best] if until == duration else run(settings[best], duration)), choice
+
+
+def _widened(error: Estimate, apart: np.ndarray) -> Estimate:
+    """The estimate, and no less than a distance [m] and an angle [rad], (2,)."""
+    return Estimate(max(error.position, float(apart[0])), max(error.angle, float(apart[1])))
 
 
 def _in_time(run: Callable[..., SimulatedRecording], scene: Scene, duration: float, target: InTime) -> tuple[SimulatedRecording, Choice]:
