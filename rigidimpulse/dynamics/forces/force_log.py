@@ -3,7 +3,9 @@
     J = integral of F ds,   H = integral of (tau + x x F) ds,   W = integral of (F.v + tau.w) ds
 
 along the trajectory of the body, where the force and its torque tau about the centre of mass follow a line over the time s since its start.
-J is the closed form of the line. H and W are Gauss's quadrature of three points: exact for H and for the work of F, as x is a cubic.
+J is the closed form of the line. H and W are Gauss's quadrature of three points: exact for H and for the work of F, as x is a cubic. Where
+joints or contacts have moved the body from the end of its trajectory by dx and a turn, the force does the work F.dx + tau.turn there: a rod
+that a motor presses against a limit stays where it is, and no work is done, though each sub-step leads it into the limit and back.
 """
 
 from __future__ import annotations
@@ -14,7 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigidimpulse.core.kernels import jit_making_arrays
-from rigidimpulse.motion.trajectory import Trajectories, state_at
+from rigidimpulse.core.portable import dot
+from rigidimpulse.core.quaternion import conjugate, multiply, rotation_vector
+from rigidimpulse.motion.body_state import BodyState
+from rigidimpulse.motion.trajectory import Trajectories, pose_at, state_at
 
 NODES = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
 WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
@@ -112,13 +117,14 @@ class ForceLog:
         self._begun = np.full(n, times[0])
         self._written = np.zeros(n, np.int64)
 
-    def begin(self, members: np.ndarray, time: float, value: np.ndarray, change: np.ndarray, length: np.ndarray) -> None:
-        """New lines act on members from `time` on: value (k, 6), that change by (k, 6) over length (n,) s.
+    def begin(self, members: np.ndarray, time: float, lines: tuple[np.ndarray, np.ndarray], length: np.ndarray, now: BodyState) -> None:
+        """New lines act on members from `time` on: values (k, 6), and their changes (k, 6) over length (n,) s.
 
-        Their trajectories must still be those that led here.
+        Their trajectories must still be those that led here; now: where they are.
         """
+        value, change = lines
         for i in members.tolist():
-            self.end(i, time)
+            self.end(i, time, now)
             rows = self._rows[i]
             self._value[rows], self._rate[rows] = value[rows], change[rows] / length[i]
 
@@ -126,8 +132,8 @@ class ForceLog:
         """What acts on bodies (r,) by the lines of rows (r,) at `time`, (r, 6) N and N m."""
         return self._value[rows] + self._rate[rows] * (time - self._begun[body])[:, None]
 
-    def end(self, i: int, time: float) -> None:
-        """The lines that act on body i end at `time`, if there are any."""
+    def end(self, i: int, time: float, now: BodyState | None = None) -> None:
+        """The lines that act on body i end at `time`, if there are any; now: where it is then, None if its trajectory leads there."""
         start = self._begun[i]
         if i not in self._rows or time <= start:
             return
@@ -139,6 +145,11 @@ class ForceLog:
         self._written[i] = last
         before = self._total[rows, 6].sum()
         add_line_integrals(self._trajectory, i, (start, start, time), rows, self._value, self._rate, self._total)
+        if now is not None:
+            x, q = np.empty(3), np.empty(4)
+            pose_at(self._trajectory, i, time, x, q)
+            moved = np.concatenate([now.position[i] - x, rotation_vector(multiply(now.orientation[i], conjugate(q)))])
+            self._total[rows, 6] += dot(self._value[rows] + self._rate[rows] * (time - start), moved)
         self.work[i] += self._total[rows, 6].sum() - before
         self._begun[i] = time
 
