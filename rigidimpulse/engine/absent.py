@@ -102,7 +102,7 @@ class NoForces:
     def carry_on(self, _earlier: Any) -> None:
         """Nothing is to be left out."""
 
-    let_act = present = may_rest = fly = load = _ask_nobody
+    let_act = present = may_rest = fly = load = push = _ask_nobody
 
 
 class NoSoftBodies:
@@ -214,7 +214,7 @@ class _NoForceLog:
         """No work on any of the bodies."""
         self.work = np.zeros(num_bodies)
 
-    def end(self, _body: int, _time: float) -> None:
+    def end(self, _body: int, _time: float, _now: Any = None) -> None:
         """Nothing is recorded."""
 
     def keep(self, _count: int) -> None:

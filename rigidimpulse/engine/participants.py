@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from rigidimpulse.model.island import Island
     from rigidimpulse.model.joint_table import Joints
     from rigidimpulse.model.world import World
+    from rigidimpulse.motion.body_state import BodyState
     from rigidimpulse.recording.joint_log import JointLog
     from rigidimpulse.recording.ledger import Ledger
     from rigidimpulse.recording.recorder import Recorder
@@ -158,8 +159,8 @@ class RunForceLog(Protocol):
 
     work: np.ndarray
 
-    def end(self, i: int, time: float, /) -> None:
-        """The lines that act on body i end at `time`, if there are any."""
+    def end(self, i: int, time: float, now: BodyState | None = None, /) -> None:
+        """The lines that act on body i end at `time`, if there are any; now: where it is then, None if its trajectory leads there."""
         ...
 
     def keep(self, count: int, /) -> None:
@@ -221,6 +222,10 @@ class RunForces(Protocol):
 
     def load(self, run: Any, island: Island, h: float, /) -> float:
         """Forces on an island that contacts or joints hold, over h s at most; returns for how long."""
+        ...
+
+    def push(self, run: Any, members: np.ndarray, span: tuple[float, float], mean: np.ndarray, /) -> float:
+        """Forces on sub-stepped members over a span [s] at most, into `value`; returns until when."""
         ...
 
 

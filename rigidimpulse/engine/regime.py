@@ -65,8 +65,8 @@ def why_not_substepped(world: World) -> str:
         return f"contact_solver is {solver!r}"
     if not world.joints_of_scene and not (world.can_collide and world.can_press):
         return "nothing presses bodies together"
-    if world.force_tables:
-        return "forces vary"
+    if any(table.burns for table in world.force_tables):
+        return "masses change"
     if solver == "cheapest" and world.rolling.size:
         return "rolling friction is exact only"
     if solver == "substepped":

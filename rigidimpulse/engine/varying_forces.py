@@ -1,11 +1,11 @@
 """Bodies under forces that vary.
 
 Bodies that no contact and no joint holds take steps of Nystroem's method (`motion.force_step`), as long as its error allows. For bodies
-that are held the force is constant over a sub-step of length h, and is the one at its middle:
+that are held, or stepped by sub-steps, the force is constant over a piece of length h, and is the one at its middle:
 
     F = F(t + h/2, x(h/2), v(h/2)),    x, v: after h/2 under the last accelerations of the body, contacts included
 
-This is of second order in h, as contact forces are, and a body at rest stays at rest. The sub-step is so short that the error of the path,
+This is of second order in h, as contact forces are, and a body at rest stays at rest. The piece is so short that the error of the path,
 |F(h/2) - F| h^2 / (6 m)  with F at both ends, is within the tolerance.
 
 Some forces act in a part of space only (`ForceTable.switches`). A step then uses the forces that act at its start. It ends where the set of
@@ -36,9 +36,9 @@ from rigidimpulse.motion.force_step import Lines, Stage, Workspace, nystroem, se
 from rigidimpulse.motion.trajectory import Trajectories
 from rigidimpulse.recording.recorder import Recorder
 
-IN_FLIGHT, IN_CONTACT = 0.03, 3.0
+IN_FLIGHT, IN_CONTACT, IN_SUB_STEPS = 0.03, 3.0, 300.0
 """How far a path may be off, relative to the size, or in rad of turn: in roots of the accuracy's tolerance, inside a step of bodies that
-fly and for each step of the run of those in contact. 1e-8 and 1e-6 by default."""
+fly, and for each step of the run of those in contact and of those that are sub-stepped. 1e-8, 1e-6 and 1e-4 by default."""
 SHORTEST = 2.0**-14
 """Part of the run's step below which it is not split for forces."""
 FIRST = 2.0**-6
@@ -88,7 +88,8 @@ class VaryingForces:
         for table in self._tables:
             np.minimum.at(self._longest, table.body, table.longest_steps())
         self._plan = self._longest.copy()
-        self._in_flight, self._in_contact = IN_FLIGHT * world.accuracy.tolerance**0.5, IN_CONTACT * world.accuracy.tolerance**0.5
+        root = world.accuracy.tolerance**0.5
+        self._in_flight, self._in_contact, self._in_sub_steps = IN_FLIGHT * root, IN_CONTACT * root, IN_SUB_STEPS * root
         self._size = np.minimum(world.bound_radius, world.size)
         self._switching = [table for table in self._tables if table.switches]
         self._cut = 0.0
@@ -171,7 +172,7 @@ class VaryingForces:
             ready = todo[done]
             follows = np.where(h[ready] < self._plan[ready], np.maximum(self._plan[ready], h[ready] * grow[done]), h[ready] * grow[done])
             self._plan[ready] = np.clip(follows, shortest, self._longest[ready])
-            self._keep(ready, time, rows, sums, h)
+            self._keep(ready, time, (rows, sums), h, now)
             self._report(run, time, ready[error[done] > 1.0], self._in_flight)
             todo, again = todo[~done], grow[~done]
             h[todo] = self._plan[todo] = _pieces(rest, np.maximum(h[todo] * again, shortest))
@@ -193,7 +194,7 @@ class VaryingForces:
             rows, sums = semi_implicit(first)
         else:
             rows, sums = nystroem(evaluate, self._workspace, first, members, h, state.now, self._world.steady_acceleration)
-        self._keep(members, time, rows, sums, h)
+        self._keep(members, time, (rows, sums), h, state.now)
         return h[members]
 
     def _switch(self, time: float, members: np.ndarray, now: BodyState, sums: Lines, h: np.ndarray) -> float:
@@ -229,7 +230,7 @@ class VaryingForces:
         if not self._was_held[members].any():
             # Nobody knows yet what contacts and joints do: forces that answer the fall would throw what has just landed.
             h = min(h, FIRST * step)
-        given = h = min(h, self._next_break(time) - time, plan)
+        h = min(h, self._next_break(time) - time, plan)
         _, start = self._start(run, time, np.full(len(self.acts), h), members)
         if not island.loaded:
             pull = (state.trajectory.acceleration[members] - world.steady_acceleration[members]) * world.mass[members, None]
@@ -237,6 +238,44 @@ class VaryingForces:
         # Held bodies go on under the sum of what acted last: contacts and joints of the last sub-step beside forces of this one would not
         # balance each other, and what damps along a held direction would make that grow.
         last = np.where(self._was_held[:, None], self._last, start)
+        h = self._hold(run, (time, h), members, (start, last), self._in_contact)
+        self._held_until[members] = time + h
+        island.loaded = True
+        total = self.value
+        run.acceleration[members] = island.free[0][self.acts[island.members]] + now.inv_mass[members, None] * total[members, :3]
+        turned = np.einsum("ijk,ik->ij", now.inv_inertia[members], total[members, 3:])
+        run.angular_acceleration[members] = island.free[1][self.acts[island.members]] + turned
+        return h
+
+    def push(self, run: Run, members: np.ndarray, span: tuple[float, float], mean: np.ndarray) -> float:
+        """Forces on sub-stepped members (k,) over a span [s] at most, into `value`; returns until when.
+
+        mean: (n, 6) their mean acceleration and angular acceleration in the last piece, by contacts and all else.
+        """
+        (time, end), now, inertia = span, run.state.now, run.state.trajectory.inertia
+        h = max(min(end, self._next_break(time)) - time, np.spacing(time))
+        _, start = self._start(run, time, np.full(len(self.acts), h), members)
+        last = np.zeros((len(self.acts), 6))
+        last[members, :3] = self._world.mass[members, None] * (mean[members, :3] - self._world.steady_acceleration[members])
+        along = np.einsum("mij,mi->mj", run.state.rotation[members], mean[members, 3:])
+        last[members, 3:] = np.einsum("mij,mj->mi", run.state.rotation[members], inertia[members] * along)
+        length = min(h, float(self._plan[members].min()))
+        apart = np.setdiff1d(np.flatnonzero(np.isin(self._component, self._component[members])), members)
+        if len(apart):
+            self._workspace.stay(apart, now, run.state.rotation)
+        held = self._hold(run, (time, length), members, (start, last), self._in_sub_steps)
+        return end if held >= (end - time) * (1.0 - SWITCHED) else time + held
+
+    def _hold(
+        self, run: Run, piece: tuple[float, float], members: np.ndarray, wrenches: tuple[np.ndarray, np.ndarray], allowed: float
+    ) -> float:
+        """Take forces on members as constant from a time on for h s at most, and begin their lines; returns for how long.
+
+        piece: time and h, s. wrenches: sums (n, 6) of forces at its start, and of all that acted on the members before, by which they are
+        taken on. allowed: how far paths may be off in a step.
+        """
+        (time, h), (start, last), now, world, state = piece, wrenches, run.state.now, self._world, run.state
+        step, given, plan = world.accuracy.step, h, float(self._plan[members].min())
         while True:
             if self.flow is not None:
                 # What holds the members feels all their masses: those of the middle.
@@ -249,7 +288,7 @@ class VaryingForces:
             _, end = self._evaluate(time + 2.0 * (1.0 - ASIDE) * half, members, self._workspace.bodies, self._workspace.rotation)
             # On both sides of the middle: a path that turns comes back to its force.
             sides = [self._errors(now, members, total - f, 2.0 * half[members], 1.0 / 6.0).max() for f in (start, end)]
-            error = max(sides) / (self._in_contact * h / step)
+            error = max(sides) / (allowed * h / step)
             grow = min(max(SAFETY * max(error, 1e-30) ** -0.5, LEAST_CHANGE), MOST_CHANGE)
             if error <= 1.0 or h <= SHORTEST * step:
                 break
@@ -260,17 +299,12 @@ class VaryingForces:
             self._workspace.stay(members[still], now, state.rotation)
             value, total = self._evaluate(time + half, members, self._workspace.bodies, self._workspace.rotation)
         if error > 1.0:
-            self._report(run, time, members, self._in_contact)
+            self._report(run, time, members, allowed)
         # Where others made it shorter, what was planned still holds.
         follows = max(plan, h * grow) if h == given < plan and error <= 1.0 else h * grow
         self._plan[members] = np.minimum(follows, self._longest[members])
         rows, sums = (Lines(f, np.zeros_like(f), np.zeros_like(f)) for f in (value, total))
-        self._keep(members, time, rows, sums, np.full(len(self.acts), h))
-        self._held_until[members] = time + h
-        island.loaded = True
-        run.acceleration[members] = island.free[0][self.acts[island.members]] + now.inv_mass[members, None] * total[members, :3]
-        turned = np.einsum("ijk,ik->ij", now.inv_inertia[members], total[members, 3:])
-        run.angular_acceleration[members] = island.free[1][self.acts[island.members]] + turned
+        self._keep(members, time, (rows, sums), np.full(len(self.acts), h), now)
         return h
 
     def _start(self, run: Run, time: float, h: np.ndarray, members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -318,11 +352,12 @@ class VaryingForces:
         best.at(common, label, values)
         return common[label]
 
-    def _keep(self, members: np.ndarray, time: float, rows: Lines, sums: Lines, h: np.ndarray) -> None:
-        """From `time` on these lines act on members, for h (n,) s."""
+    def _keep(self, members: np.ndarray, time: float, lines: tuple[Lines, Lines], h: np.ndarray, now: BodyState) -> None:
+        """From `time` on these lines, of rows and their sums, act on members, who are where they are now, for h (n,) s."""
+        rows, sums = lines
         self.value[members] = sums.value[members]
         self.rate[members] = sums.change[members] / h[members, None]
-        self.log.begin(members, time, rows.value, rows.change, h)
+        self.log.begin(members, time, (rows.value, rows.change), h, now)
 
     def finish(self, world: World, times: np.ndarray, recorder: Recorder) -> ForceWork:
         """What the forces did until the frames, and their potential energy there."""

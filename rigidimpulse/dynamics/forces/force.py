@@ -58,6 +58,7 @@ class ForceTable(ABC):
         is_steady: whether the forces change only if bodies move, so that bodies may come to rest under them.
         comes_and_goes: whether bodies feel them only while they are told so (`VaryingForces.let_act`).
         reason: what `explain` says of them.
+        burns: whether it changes the masses of bodies.
         switches: whether they begin and end where bodies are, so that steps must end there (`freeze`, `switched`).
 
     """
@@ -70,6 +71,7 @@ class ForceTable(ABC):
     is_steady: bool
     comes_and_goes = False
     reason: str
+    burns: ClassVar[bool] = False
     switches: ClassVar[bool] = False
 
     @abstractmethod

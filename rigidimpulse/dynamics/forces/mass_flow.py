@@ -21,6 +21,8 @@ from rigidimpulse.motion.trajectory import Trajectories
 class BurningForces(ForceTable):
     """Forces that take mass from their bodies."""
 
+    burns = True
+
     @abstractmethod
     def burnt(self, times: np.ndarray) -> np.ndarray:
         """Mass that each row has taken from its body until `times` (..., k), kg."""

@@ -142,7 +142,7 @@ def begin_trajectory(run: Run, pair_events: PairEvents, i: int, time: float, hel
     run.recorder.flush(trajectory, i, time, state.correction[i])
     state.correction[i] = 0.0
     run.contact_log.close(np.array([i]), time)
-    run.forces.log.end(i, time)
+    run.forces.log.end(i, time, now)
     account_contact_work(run, i, time)
     total, rate = held
     if run.forces.acts[i]:

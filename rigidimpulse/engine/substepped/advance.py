@@ -20,6 +20,7 @@ from rigidimpulse.collision.contact_buffer import Question
 from rigidimpulse.collision.contact_records import MEMBER, SUPPORT
 from rigidimpulse.collision.geometry import Shapes
 from rigidimpulse.collision.manifold.dispatch import PairQuery
+from rigidimpulse.core.portable import length
 from rigidimpulse.dynamics.energy import mechanical_energy
 from rigidimpulse.engine.cheapest import CheapestRegime, Near
 from rigidimpulse.engine.exact.advance import NOT_HELD
@@ -114,6 +115,8 @@ class SubsteppedIslands:
         self._taken = np.zeros(world.num_bodies, bool)
         self._auto = solver == "auto"
         self._jointed = jointed(world)
+        self._stays = self._jointed | _tied(world)
+        self._mean = np.zeros((world.num_bodies, 6))
         self.hand_over = HandOver(world, self._jointed, CheapestRegime(self._jointed) if solver == "cheapest" else None)
         self._joint_stepper: JointedStepper | None = None
         self._paths = MemberPaths(world, self.label)
@@ -140,7 +143,7 @@ class SubsteppedIslands:
         """What is known of the bodies where members are chosen."""
         world = self._world
         return Candidates(
-            world.dynamic, world.moving, self._jointed, world.mass, self.stepper.inner, world.steady_acceleration, world.steady_strength,
+            world.dynamic, world.moving, self._stays, world.mass, self.stepper.inner, world.steady_acceleration, world.steady_strength,
             self.label, self.sleep_timer, self.asleep, self._let_go,
         )  # fmt: skip
 
@@ -208,7 +211,7 @@ class SubsteppedIslands:
         Returns the pairs of a step that has begun and that the loop must finish; else None.
         """
         # Nobody looks at the run between such steps, and members without joints are asked for.
-        watched = run.plan.observe or run.soft_bodies.moves or self._jointed.any() or self._wedged.any()
+        watched = run.plan.observe or run.soft_bodies.moves or self._stays.any() or self._wedged.any() or bool(self._world.force_tables)
         if watched or not self._taken.any() or not is_undisturbed(run.state.trajectory, self._world.constants):
             return None
         with run.plan.clock(NAME):
@@ -250,7 +253,7 @@ class SubsteppedIslands:
         while resting and len(woken := self._touched(run, member, near)):
             member[woken] = True
             near = self.stepper.near(run, member, pair_events.end - time)
-        links = run.joints.links()
+        links = np.concatenate([run.joints.links(), run.forces.links()])
         connect_members(near, links, candidates, member, root, self._near_islands)
         joined = np.zeros_like(member)
         if self._jointed.any():
@@ -287,14 +290,14 @@ class SubsteppedIslands:
         return refused
 
     def _leave_out_fast(self, run: Run, member: np.ndarray) -> None:
-        """Unmark those that are too fast for sub-steps; what joints join stays together, and is given more of them."""
-        joined = member & self._jointed
+        """Unmark those that are too fast for sub-steps; what joints and forces join stays together, and is given more of them."""
+        joined = member & self._stays
         mark_slow(run.state.now, self.stepper.inner, self._limits, member)
         member |= joined
 
     def _touched(self, run: Run, member: np.ndarray, near: np.ndarray) -> np.ndarray:
         """Bodies at rest that members touch, and all of the islands they belong to."""
-        world, links = run.world, run.joints.links()
+        world, links = run.world, np.concatenate([run.joints.links(), run.forces.links()])
         resting = world.dynamic & ~member & (run.state.trajectory.mode == FIXED)
         which = np.flatnonzero(resting[near[0]] | resting[near[1]])
         if not len(which):
@@ -307,7 +310,7 @@ class SubsteppedIslands:
         touched = np.unique(buffer.integer[:count, :2])
         touched = touched[resting[touched]]
         labels = self.label[touched]
-        # Sleeping islands wake as a whole, and so does what joints join.
+        # Sleeping islands wake as a whole, and so does what joints and forces join.
         joined = island_roots(world.num_bodies, links[:, 0], links[:, 1], world.dynamic)
         mates = np.isin(self.label, labels[labels >= 0]) | np.isin(joined, joined[touched])
         return np.flatnonzero(resting & mates)
@@ -337,6 +340,10 @@ class SubsteppedIslands:
         if self._jointed.any():
             for r in np.unique(root[chosen & self._jointed]).tolist():
                 driven[r] = self._is_driven(run, np.flatnonzero(chosen & (root == r)))
+        if self._world.force_tables:
+            acted = np.flatnonzero(chosen & run.forces.acts)
+            for r in np.unique(root[acted]).tolist():
+                driven[r] |= not run.forces.may_rest(acted[root[acted] == r])
         sleeps = settle_islands(run.state.now, self._candidates, near, links, chosen, root, driven, self._rest)
         if len(sleeps):
             self._paths.put_to_sleep(run, self.stepper, np.flatnonzero(sleeps & (run.state.trajectory.mode != FIXED)), time)
@@ -364,7 +371,7 @@ class SubsteppedIslands:
             return [island for island in islands if np.all(self.label[island.members] < 0)]
         for island in islands:
             exact = bool(np.all(self.label[island.members] < 0))
-            if exact and self.hand_over.runs_away(island) and self.hand_over.hands_over(run, pair_events, island):
+            if exact and self.hand_over.runs_away(run, island) and self.hand_over.hands_over(run, pair_events, island):
                 self.label[island.members] = island.members.min()
         if len(lost := self.hand_over.lost(pair_events, islands, self.label < 0)):
             # One sub-stepped island from here on.
@@ -420,7 +427,7 @@ class SubsteppedIslands:
             # Bodies that touch the island join it, except jointed ones, and those that are too fast for sub-steps and leave it.
             self._leave_out_fast(run, stays)
             stays[island.members] |= ~self._leaves(run, island)
-            stays[island.members] |= self._jointed[island.members]
+            stays[island.members] |= self._stays[island.members]
             near = island.members[stays[island.members]]
             island.substepped = members = np.union1d(members, near)
             # What an island connects is one sub-stepped island from here on; others that are stepped with it stay their own.
@@ -444,6 +451,8 @@ class SubsteppedIslands:
         for part in self._solved_together(run, pair_events, members):
             self._paths.steps += 1
             end = self._end_of(run, pair_events, island.time, part)
+            if world.force_tables:
+                end = self._press(run, part, island.time, end)
             out = self._step(run, part, np.intersect1d(fresh, part) if len(fresh) else fresh, (island.time, end), kept)
             if out is None:
                 self._give_back(run, pair_events, part, island.time)
@@ -505,7 +514,7 @@ class SubsteppedIslands:
             return None
         way = None
         if out.waypoints is not None:
-            way = way_of(out, out.waypoints, run.state.now, (time, end), len(which) > 0 and self._flies(run, which))
+            way = way_of(out, out.waypoints, run.state.now, span, len(which) > 0 and self._flies(run, which), run.acceleration)
         self._paths.begin(run, out, span, which, way)
         return out
 
@@ -545,6 +554,10 @@ class SubsteppedIslands:
             run.joints.begin_sub_steps(run, fresh, time)
         run.wrench[fresh] = 0.0
         run.contact_log.close(fresh, time)
+        if run.world.force_tables:
+            self._mean[fresh] = 0.0
+            for i in fresh.tolist():
+                run.forces.log.end(i, time, run.state.now)
         note_end_energy(run.state.limiter, run.state.now, run.world.constants, fresh)
         for i in fresh[run.state.under_contact[fresh]].tolist():
             account_contact_work(run, i, time)
@@ -563,6 +576,20 @@ class SubsteppedIslands:
             at_once, straight = run.world.accuracy.step, np.inf if alone else straight
         end = stepper.end_of(run.state.now, members, (at_once, straight), (time, pair_events.end))
         return min(end, run.joints.next_release(joints, time)) if len(joints) else end
+
+    def _press(self, run: Run, members: np.ndarray, time: float, end: float) -> float:
+        """Let varying forces act on members that are solved together from `time` to `end` at most; returns until when they do."""
+        stepper, steady, inv_mass = self.stepper, run.world.steady_acceleration, run.state.now.inv_mass
+        run.acceleration[members], stepper.torque[members] = steady[members], 0.0
+        stepper.strength[members] = run.world.steady_strength[members]
+        acted = members[run.forces.acts[members]]
+        if len(acted):
+            end = run.forces.push(run, acted, (time, end), self._mean)
+            force = run.forces.value[acted]
+            run.acceleration[acted] += inv_mass[acted, None] * force[:, :3]
+            stepper.torque[acted] = force[:, 3:]
+            stepper.strength[acted] = np.maximum(stepper.strength[acted], length(run.acceleration[acted]))
+        return end
 
     def _leaves(self, run: Run, island: Island) -> np.ndarray:
         """Which members (k,) bool leave all that they touch at a speed worth the name."""
@@ -594,6 +621,9 @@ class SubsteppedIslands:
         if not self._outcomes:
             return
         for out, end in self._outcomes:
+            if run.world.force_tables:
+                before = np.column_stack([state.now.velocity[out.members], state.now.angular_velocity[out.members]])
+                self._mean[out.members] = (out.velocity - before) / (end - time)
             run.recorder.flush_all(state.trajectory, out.members, time)
             depart(state.trajectory, out.members, time, end - time, state.now, out.position, out.orientation, out.velocity)
             state.correction[out.members] = 0.0
@@ -615,6 +645,14 @@ def _struck(run: Run, joined: np.ndarray, time: float) -> np.ndarray:
     if joined.any():
         out[held_pairs(memory, run.state.trajectory.start)] = True
         out[rebounded_pairs(memory, time - run.world.accuracy.step, len(joined))] = True
+    return out
+
+
+def _tied(world: World) -> np.ndarray:
+    """Which bodies (n,) bool varying forces tie to others: they are stepped together."""
+    out = np.zeros(world.num_bodies, bool)
+    for table in world.force_tables:
+        out[table.links] = True
     return out
 
 

@@ -209,6 +209,7 @@ class ContactStepper:
         motion: inner radii, see `Accuracy.substep_motion`.
         kept: inner radii that a pair may come past each other with the contacts it has, in the middle of a step.
         at_once, at_once_alone: the same with the skins by which trajectories may stray from the ways of turning bodies.
+        strength: (n,) m/s2, of gravity and forces. torque: (n, 3) N m, of forces that vary.
         bodies: by rank. table: pairs and contact points. balance: of their energy. island: what kernels need of the bodies.
         around: what does not change of them, and who takes part.
         pressed: (n,) bool, contacts acted on the body when it was last stepped.
@@ -233,6 +234,7 @@ class ContactStepper:
         self._moves[world.shape_of_body[movable]] = True
         self.inner = np.where(movable, inner_radii(world.geometry, world.convex_depths)[world.shape_of_body], np.inf)
         self.skin = TOLERANCES.sub_stepping.skin * self.inner
+        self.strength, self.torque = world.steady_strength.copy(), np.zeros((n, 3))
         self.reach = np.where(world.ball, 0.0, world.bound_radius)
         convex = convex_polyhedra(world.geometry, world.convex_depths)
         self.shapes = make_polyhedra(world.geometry, convex, several=several_polyhedra(world.geometry))
@@ -270,7 +272,7 @@ class ContactStepper:
         straight = world.accuracy.substep_motion * parts.straight
         self.at_once = self.step_length, straight
         self.at_once_alone = (self.alone_length, np.inf) if self.alone_length > self.step_length else self.at_once
-        self._ends = Ends(self.inner, world.steady_strength, self.reach, self.skin, parts.all_stray)
+        self._ends = Ends(self.inner, self.strength, self.reach, self.skin, parts.all_stray)
         self.kept = KEPT * self.motion
         # Balls and moving supports: all contacts are found again in the middle of a step.
         self._all_quick = bool(world.moving.any() or world.ball.any())
@@ -278,7 +280,7 @@ class ContactStepper:
         self.pressed = np.zeros(n, bool)
         self._places, self._margins = np.zeros(0, np.int64), np.zeros(0)
         self.members, self._progress = np.zeros(0, np.int64), np.zeros(COLUMNS, np.int64)
-        self.around = Surroundings(bounds, self.fat_boxes.fat, world.inv_mass, world.steady_strength, self._part)
+        self.around = Surroundings(bounds, self.fat_boxes.fat, world.inv_mass, self.strength, self.torque, self._part)
         self._demands = np.zeros(DEMANDS)
         self.island = Island(
             self._convex, self.bodies, self.balance, self._weights, self.order, self._cornered, world.coefficients
@@ -310,8 +312,9 @@ class ContactStepper:
             alike=by_rank(~unlike, True), inner=by_rank(self.inner, np.inf), skin=by_rank(self.skin, np.inf),
             reach=by_rank(self.reach, 0.0), radius=by_rank(world.bound_radius, 0.0), part=np.zeros(n + 1, np.int64),
             position=np.zeros((n + 1, 3)), orientation=np.zeros((n + 1, 4)), rotation=np.zeros((n + 1, 3, 3)),
-            gravity=np.zeros((n + 1, 3)), velocity=aligned(n + 1), before=aligned(n + 1), moved=aligned(n + 1), drift=aligned(n + 1),
-            quick=np.zeros(n + 1, bool), mass=aligned(n + 1), change=np.zeros(n + 1), held=np.zeros(n + 1, bool),
+            gravity=np.zeros((n + 1, 3)), torque=np.zeros((n + 1, 3)), work=np.zeros(n + 1), velocity=aligned(n + 1),
+            before=aligned(n + 1), moved=aligned(n + 1), drift=aligned(n + 1), quick=np.zeros(n + 1, bool), mass=aligned(n + 1),
+            change=np.zeros(n + 1), held=np.zeros(n + 1, bool),
         )  # fmt: skip
 
     def sub_step(self, members: np.ndarray) -> float:

@@ -28,6 +28,8 @@ MOST_REBOUNDS = 30000.0
 MOST_UNLIKE = 6000.0
 """The same for neighbours of unlike masses (`regime.unlike`), over the number of bodies of their island, since each time deals with all of
 them: a load that presses a light tilted disc flat needs hundreds."""
+FORCED = 5.0
+"""Times in place of one that an island counts to be dealt with on which varying forces act: forces are evaluated outside of kernels."""
 HANDED = "exact contact cost more than it advanced: sub-steps hold these bodies, which may sink in by a skin, 0.8 % of the inner radius"
 
 
@@ -85,9 +87,10 @@ class HandOver:
         for island in islands:
             self.solve_count[island.members] += 1.0
 
-    def runs_away(self, island: Island) -> bool:
+    def runs_away(self, run: Run, island: Island) -> bool:
         """Whether a member was dealt with more often than the island is worth."""
-        return bool(np.any(self.solve_count[island.members] > most_solves.py_func(len(island.members))))
+        weight = FORCED if run.forces.acts[island.members].any() else 1.0
+        return bool(np.any(weight * self.solve_count[island.members] > most_solves.py_func(len(island.members))))
 
     def hands_over(self, run: Run, pair_events: PairEvents, island: Island) -> bool:
         """Whether an exact island that runs away is sub-stepped from its instant on; then it is said so."""

@@ -33,7 +33,8 @@ class Surroundings(NamedTuple):
     bounds: BodyBounds
     fat: Fat
     inv_mass: np.ndarray  # (n,) 1/kg
-    strength: np.ndarray  # (n,) m/s2, of steady forces
+    strength: np.ndarray  # (n,) m/s2, of gravity and forces
+    torque: np.ndarray  # (n, 3) N m, of forces
     part: np.ndarray  # (n,) MEMBER, SUPPORT or OUTSIDE, by index
 
 
@@ -58,11 +59,13 @@ def load_island(island, pairs, around, motion, ahead, demands):
     bodies, part, now = island.bodies, around.part, motion.now
     if not stay_in_boxes(around.bounds, around.fat, now, motion.acceleration, part, ahead):
         return False
-    load_bodies(bodies, island.order, now, motion.acceleration, around.inv_mass, part)
+    load_bodies(bodies, island.order, now, (motion.acceleration, around.torque), around.inv_mass, part)
     strength, skin = 0.0, np.inf
     for k in range(island.order.shape[0]):
         if bodies.part[k] == MEMBER:
             strength, skin = max(strength, around.strength[island.order[k]]), min(skin, bodies.skin[k])
+            for c in range(3):
+                island.weights.pull[k, c] = bodies.gravity[k, c]
     fall = 0.5 * ahead * strength
     note_changes(bodies, pairs, ahead, fall, island.coefficients)
     demands[STRENGTH], demands[SKIN], demands[RATIO] = strength, skin, _most_unlike(island, pairs)

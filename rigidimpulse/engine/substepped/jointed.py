@@ -186,9 +186,12 @@ class JointedStepper:
         They have not kept it either where the balance had to take more than MOST_TAKEN of what moves, and that rise.
         """
         energies, constants, members = self._energies, self._world.constants, out.members
+        if self._world.force_tables:
+            constants = constants._replace(steady_acceleration=run.acceleration)
         compare_energies(run.state.now, constants, members, (out.position, out.orientation, out.velocity), energies)
         before, after, moved_before, moves_after = energies.tolist()
-        moves, gained = max(moved_before, moves_after), after - before - float(out.raised.sum())
+        twisted = float(self._stepper.bodies.work[out.rank].sum())
+        moves, gained = max(moved_before, moves_after), after - before - float(out.raised.sum()) - twisted
         rise = float(np.sum(constants.mass[members] * constants.steady_strength[members] * self._stepper.skin[members]))
         # Comparisons with what is no number are false.
         return gained <= GAINED * moves + rise and float(out.taken.sum()) <= MOST_TAKEN * moves + rise

@@ -16,7 +16,7 @@ from rigidimpulse.engine.run import Run
 from rigidimpulse.engine.substepped.contact_forces import ContactStepper, Outcome
 from rigidimpulse.engine.substepped.island_step import add_mechanical_energies, energies_of_islands
 from rigidimpulse.engine.substepped.trajectories import end_trajectories
-from rigidimpulse.engine.substepped.waypoints import Flown, Way, part_of, write_frames
+from rigidimpulse.engine.substepped.waypoints import Way, part_of, write_frames
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.trajectory import FIXED
 from rigidimpulse.recording.recorder import sample_paths
@@ -29,7 +29,7 @@ class _Began(NamedTuple):
 
     time: float  # s, of its start
     end: float  # s
-    energy: float  # J, at its start
+    energy: float  # J, at its start, less the work of varying forces so far
     taken: float  # J that the balance of energy takes off until its end
     raised: float  # J that bodies gain until then by rising out of each other, and cannot pay
     given: float  # J that drives and moving supports give by joints and the contacts beside them
@@ -77,6 +77,7 @@ class MemberPaths:
     def begin(self, run: Run, out: Outcome, span: tuple[float, float], joints: np.ndarray, way: Way | None) -> None:
         """Know what the step of an outcome will have done; span: of its time, s, joints: of its members, way: theirs, if frames fall in."""
         energies_of_islands(run.state.now, run.world.constants, out.members, self._label, out.energies, self._energies)
+        self._leave_out_forces(run, out.members, self._energies[0])
         self.know(out.members, self._energies, span, joints, way)
 
     def know(
@@ -108,11 +109,21 @@ class MemberPaths:
             assert whole is not None
             # An island that was hit is on a way of its own from there, and others that were stepped with it are still on theirs.
             way = part_of(whole, members[np.isin(self._label[members], on_it)])
-            write_frames(run.recorder, way, time, Flown(world.inertia[way.bodies], world.steady_acceleration[way.bodies]))
+            write_frames(run.recorder, way, time, world.inertia[way.bodies])
+        if world.force_tables:
+            for i in members.tolist():
+                run.forces.log.end(i, time)
         _end_paths(run.motion, world.constants, members, time, run.recorder.frames, run.recorder.written, self._label, self._energy)
+        self._leave_out_forces(run, members, self._energy)
         for label in labels:
             if label in self._began:
                 self._account(run, self._began.pop(label), float(self._energy[label]), time)
+
+    def _leave_out_forces(self, run: Run, members: np.ndarray, energy: np.ndarray) -> None:
+        """Take the work that varying forces have done on members off the energies (n,) J of their islands, by label."""
+        if run.world.force_tables:
+            in_island = members[self._label[members] >= 0]
+            np.subtract.at(energy, self._label[in_island], run.forces.log.work[in_island])
 
     def _account(self, run: Run, began: _Began, energy: float, time: float) -> None:
         """Account for a step that ends at `time` with an energy, J."""

@@ -137,6 +137,6 @@ class UndisturbedSteps:
         self._cheapest.note(members, stepper.parts)
         recorded, reached = (run.recorder.frames, run.recorder.written), (out.position, out.orientation, out.velocity, out.energies)
         land_members(self._landing, run.motion, run.state.correction, recorded, out.members, reached, (time, end - time))
-        way = None if out.waypoints is None else way_of(out, out.waypoints, run.state.now, span, flies=False)
+        way = None if out.waypoints is None else way_of(out, out.waypoints, run.state.now, span, False, run.acceleration)
         self._paths.know(out.members, self._landing.energies, span, NO_JOINTS, way)
         self._paths.steps += 1

@@ -37,19 +37,15 @@ class Way(NamedTuple):
     time: np.ndarray  # (w,) s, from its start to its end
     state: np.ndarray  # (w, k, 13) position, orientation, velocity, angular velocity
     landed: np.ndarray  # (w, k, 3) rad/s, where the flight from the waypoint before ends; empty where bodies do not fly
+    pull: np.ndarray  # (k, 3) m/s2, by gravity and forces
 
 
-class Flown(NamedTuple):
-    """What the flights of k bodies between waypoints depend on."""
-
-    inertia: np.ndarray  # (k, 3) kg m2, along principal axes
-    gravity: np.ndarray  # (k, 3) m/s2, with constant forces
-
-
-def way_of(outcome: Outcome, waypoints: Waypoints, now: BodyState, span: tuple[float, float], flies: bool) -> Way:
+def way_of(
+    outcome: Outcome, waypoints: Waypoints, now: BodyState, span: tuple[float, float], flies: bool, pull: np.ndarray
+) -> Way:
     """The way of an outcome from the present state by waypoints, over a span [s].
 
-    flies: whether it is that of an island with joints that nothing else holds.
+    flies: whether it is that of an island with joints that nothing else holds; pull: (n, 3) m/s2, what pulls bodies.
     """
     members, (begin, end) = outcome.members, span
     first = np.column_stack([now.position[members], now.orientation[members], now.velocity[members], now.angular_velocity[members]])
@@ -61,17 +57,17 @@ def way_of(outcome: Outcome, waypoints: Waypoints, now: BodyState, span: tuple[f
     landed = state[: len(state) if flies else 0, :, 10:].copy()
     if flies and not inside.all():
         landed[-1] = waypoints.state[len(state) - 2, :, 10:]
-    return Way(members, time, state, landed)
+    return Way(members, time, state, landed, pull[members])
 
 
 def part_of(way: Way, bodies: np.ndarray) -> Way:
     """The way of some of its bodies."""
     which = np.isin(way.bodies, bodies)
-    return Way(way.bodies[which], way.time, way.state[:, which], way.landed[:, which])
+    return Way(way.bodies[which], way.time, way.state[:, which], way.landed[:, which], way.pull[which])
 
 
-def write_frames(recorder: Recorder, way: Way, until: float, flown: Flown) -> None:
-    """Write the frames along a way before `until` [s]; flown: of its bodies."""
+def write_frames(recorder: Recorder, way: Way, until: float, inertia: np.ndarray) -> None:
+    """Write the frames along a way before `until` [s]; inertia: (k, 3) kg m2 of its bodies, along principal axes."""
     first, last = np.searchsorted(recorder.times, [way.time[0], until]).tolist()
     k = len(way.bodies)
     frames, trajectories, everyone = Recorder(recorder.times[first:last], k), make_trajectories(k), np.arange(k)
@@ -86,18 +82,18 @@ def write_frames(recorder: Recorder, way: Way, until: float, flown: Flown) -> No
         written = max(int(frames.written[0]), int(np.searchsorted(frames.times, way.time[0], side="right")))
         frames.flush_all(trajectories, everyone, end)
         if len(way.landed):
-            _fly(frames.frames, slice(written, int(frames.written[0])), way, leg, flown)
+            _fly(frames.frames, slice(written, int(frames.written[0])), way, leg, inertia)
     recorder.put(way.bodies, first, frames.frames)
 
 
-def _fly(frames: Frames, rows: slice, way: Way, leg: int, flown: Flown) -> None:
+def _fly(frames: Frames, rows: slice, way: Way, leg: int, inertia: np.ndarray) -> None:
     """Give the frames in `rows`, which are on a leg of a way, the velocities of the flight."""
     (begin, end), (before, after) = way.time[leg : leg + 2], way.state[leg : leg + 2]
     since = frames.times[rows, None, None] - 0.5 * (begin + end)
-    frames.velocity[rows] = (after[:, :3] - before[:, :3]) / (end - begin) + since * flown.gravity
-    spin = rotate(after[:, 3:7], flown.inertia * rotate_inverse(after[:, 3:7], way.landed[leg + 1]))
+    frames.velocity[rows] = (after[:, :3] - before[:, :3]) / (end - begin) + since * way.pull
+    spin = rotate(after[:, 3:7], inertia * rotate_inverse(after[:, 3:7], way.landed[leg + 1]))
     turn = frames.orientation[rows]
-    frames.angular_velocity[rows] = rotate(turn, rotate_inverse(turn, np.broadcast_to(spin, (*turn.shape[:-1], 3))) / flown.inertia)
+    frames.angular_velocity[rows] = rotate(turn, rotate_inverse(turn, np.broadcast_to(spin, (*turn.shape[:-1], 3))) / inertia)
 
 
 def _columns(state: np.ndarray) -> list[np.ndarray]:

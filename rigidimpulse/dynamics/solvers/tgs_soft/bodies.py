@@ -31,7 +31,9 @@ class SolverBodies(NamedTuple):
     position: np.ndarray  # (n+1, 3) m
     orientation: np.ndarray  # (n+1, 4)
     rotation: np.ndarray  # (n+1, 3, 3)
-    gravity: np.ndarray  # (n+1, 3) m/s2
+    gravity: np.ndarray  # (n+1, 3) m/s2, with forces
+    torque: np.ndarray  # (n+1, 3) N m, of forces
+    work: np.ndarray  # (n+1,) J, of that torque since the energy was last balanced
     velocity: np.ndarray  # (8 (n+1),) m/s and rad/s, world
     before: np.ndarray  # (8 (n+1),) the same before contacts acted in the sub-step
     moved: np.ndarray  # (8 (n+1),) m and rad, since contacts were last found
@@ -56,8 +58,12 @@ def set_inverse_inertia(bodies, i):
 
 
 @jit_making_arrays
-def load_bodies(bodies, order, now, acceleration, inv_mass, part):
-    """Load the present state of the bodies that take part; part (n,) by index, order (n,) index by rank."""
+def load_bodies(bodies, order, now, load, inv_mass, part):
+    """Load the present state of the bodies that take part; part (n,) by index, order (n,) index by rank.
+
+    load: accelerations (n, 3) m/s2 and torques (n, 3) N m of what acts on bodies beside contacts, by index.
+    """
+    acceleration, torque = load
     for k in range(order.shape[0]):
         i = order[k]
         bodies.part[k], bodies.quick[k] = part[i], True
@@ -68,6 +74,7 @@ def load_bodies(bodies, order, now, acceleration, inv_mass, part):
             bodies.velocity[8 * k + c] = now.velocity[i, c]
             bodies.velocity[8 * k + 3 + c] = now.angular_velocity[i, c]
             bodies.gravity[k, c] = acceleration[i, c] if part[i] == MEMBER else 0.0
+            bodies.torque[k, c] = torque[i, c] if part[i] == MEMBER else 0.0
         for c in range(4):
             bodies.orientation[k, c] = now.orientation[i, c]
         for c in range(6):

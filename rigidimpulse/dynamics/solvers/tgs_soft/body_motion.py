@@ -2,8 +2,9 @@
 
 With h the length of the sub-step, v the velocity, w the spin, g gravity, x the position, q the orientation and I the inertia:
 
-    kick    v <- v + h g
-    move    x <- x + h v,   q <- exp(h w) q;   where no contact pushed also x <- x - h^2 g / 2, which makes it the parabola
+    kick    v <- v + h g,   w <- w + h I^-1 tau;     the torque tau of forces does the work  h tau.(w + h I^-1 tau / 2)
+    move    x <- x + h v,   q <- exp(h w) q;   where no contact pushed also x <- x - h^2 g / 2, which makes it the parabola, and likewise
+            q by the mean spin w - h I^-1 tau / 2
     bodies whose moments differ keep their angular momentum: w <- I(q')^-1 I(q) w, see `turn_freely`
 """
 
@@ -67,9 +68,45 @@ def turn_freely(bodies, i, h):
     return wx, wy, wz
 
 
+@inlined
+def is_twisted(bodies, i):
+    """Whether a torque of forces acts on body i."""
+    return bodies.torque[i, 0] != 0.0 or bodies.torque[i, 1] != 0.0 or bodies.torque[i, 2] != 0.0
+
+
+@jit
+def _spin_up(bodies, i, h):
+    """h I^-1 tau of body i, rad/s."""
+    m, o, t = bodies.mass, 8 * i, bodies.torque[i]
+    return (
+        h * (m[o] * t[0] + m[o + 1] * t[1] + m[o + 2] * t[2]),
+        h * (m[o + 1] * t[0] + m[o + 3] * t[1] + m[o + 4] * t[2]),
+        h * (m[o + 2] * t[0] + m[o + 4] * t[1] + m[o + 5] * t[2]),
+    )
+
+
+@jit
+def _turn_evenly(bodies, i, h):
+    """Turn body i, which no contact pushed, over h s by the mean spin of the sub-step; then its spin is that at the end."""
+    v, moved, drift, o = bodies.velocity, bodies.moved, bodies.drift, 8 * i + 3
+    x, y, z = _spin_up(bodies, i, 0.5 * h)
+    v[o] -= x
+    v[o + 1] -= y
+    v[o + 2] -= z
+    wx, wy, wz = v[o], v[o + 1], v[o + 2]
+    if not bodies.alike[i]:
+        wx, wy, wz = turn_freely(bodies, i, h)
+    for k, turn in ((0, h * wx), (1, h * wy), (2, h * wz)):
+        moved[o + k] += turn
+        drift[o + k] += turn
+    v[o] += x
+    v[o + 1] += y
+    v[o + 2] += z
+
+
 @jit
 def kick(bodies, begin, end, h):
-    """Let gravity act over h s on the bodies from `begin` to `end`."""
+    """Let gravity and the torque of forces act over h s on the bodies from `begin` to `end`."""
     v, before = bodies.velocity, bodies.before
     for i in range(begin, end):
         if bodies.part[i] != MEMBER:
@@ -77,6 +114,13 @@ def kick(bodies, begin, end, h):
         o = 8 * i
         for k in range(3):
             v[o + k] += h * bodies.gravity[i, k]
+        if is_twisted(bodies, i):
+            x, y, z = _spin_up(bodies, i, h)
+            t = bodies.torque[i]
+            bodies.work[i] += h * (t[0] * (v[o + 3] + 0.5 * x) + t[1] * (v[o + 4] + 0.5 * y) + t[2] * (v[o + 5] + 0.5 * z))
+            v[o + 3] += x
+            v[o + 4] += y
+            v[o + 5] += z
         for k in range(6):
             before[o + k] = v[o + k]
 
@@ -101,6 +145,9 @@ def move(bodies, begin, end, h):
             moved[o + k] += step
             drift[o + k] += step
         wx, wy, wz = v[o + 3], v[o + 4], v[o + 5]
+        if loose and is_twisted(bodies, i):
+            _turn_evenly(bodies, i, h)
+            continue
         if wx == 0.0 and wy == 0.0 and wz == 0.0:
             continue
         # Bodies whose moments differ keep their angular momentum, not their spin.

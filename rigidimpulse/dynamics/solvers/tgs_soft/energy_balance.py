@@ -2,7 +2,7 @@
 
 Sub-steps push bodies out of the skin, and round; both make a little energy. Members that no contact connects cannot give each other any.
 So the members fall into clusters: those that contacts between them connect in the step. With the energy E of a cluster after a step, E_0
-before it, the work G of moving supports and the kinetic energy T, its speeds are multiplied by f:
+before it, the work G of moving supports and of torques, and the kinetic energy T, its speeds are multiplied by f:
 
     gained = E - E_0 - G > 0:    f^2 = 1 - gained / T
 
@@ -41,7 +41,7 @@ class Weights(NamedTuple):
     """Of n bodies by rank."""
 
     mass: np.ndarray  # (n,) kg
-    pull: np.ndarray  # (n, 3) m/s2, steady acceleration
+    pull: np.ndarray  # (n, 3) m/s2, acceleration by gravity and forces
 
 
 class Balance(NamedTuple):
@@ -206,7 +206,7 @@ def begin_part(balance, bodies, weights):
     """Begin a part of a step: forget what was connected, and remember the energy of each member; what was taken and raised adds up."""
     for i in range(balance.parent.shape[0]):
         balance.parent[i], balance.touched[i], balance.held[i] = i, False, False
-        balance.given[i] = balance.before[i] = 0.0
+        balance.given[i] = balance.before[i] = bodies.work[i] = 0.0
     for i in range(weights.mass.shape[0]):
         if bodies.part[i] == MEMBER:
             balance.before[i] = _energy(bodies, weights, i)[1]
@@ -239,7 +239,7 @@ def end_balance(balance, bodies, weights):
             root = root_of(balance.parent, i)
             own[i], total = _energy(bodies, weights, i)
             kinetic[root] += own[i]
-            gained[root] += total - balance.before[i] - balance.given[i]
+            gained[root] += total - balance.before[i] - balance.given[i] - bodies.work[i]
     members, begin = _free_clusters(balance, bodies)
     for c in range(begin.shape[0] - 1):
         cluster = members[begin[c] : begin[c + 1]]

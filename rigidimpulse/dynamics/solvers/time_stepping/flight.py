@@ -1,6 +1,6 @@
 """How the bodies of a jointed island move in a sub-step h, and how the joints close at its end.
 
-    kick    v <- v + h/2 g                                          before and after the rows are solved
+    kick    v <- v + h/2 g,   w <- w + h/2 I^-1 tau                   before and after the rows are solved; tau: torque of forces
     fly     x_1 = x_0 + h v,   q_1 by the free rotation from q_0     which keeps the angular momentum
     close   while |C(x_1)| > allowed:   v <- v + M^-1 J_0^T p,   J_0 M^-1 J_0^T p = -C(x_1) / h,   fly again
 
@@ -22,11 +22,12 @@ import numpy as np
 
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
+from rigidimpulse.core.vector import turned
 from rigidimpulse.dynamics.constraints.joint import joint_values
 from rigidimpulse.dynamics.constraints.jointed_island import count_joint_rows
 from rigidimpulse.dynamics.constraints.rows import change_velocities, take_rows
 from rigidimpulse.dynamics.solvers.free_rows import count_free, factor_free, give, take_free
-from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import set_orientation, turn_freely
+from rigidimpulse.dynamics.solvers.tgs_soft.body_motion import is_twisted, set_orientation, turn_freely
 
 STIFFEN, FORGET = 1.0, 0.1
 MOST_ROUNDS = 6
@@ -35,10 +36,17 @@ MOST_ROUNDS = 6
 
 @jit
 def kick(bodies, now, members, h):
-    """Let gravity act on the members for h s."""
+    """Let gravity and the torque of forces act on the members for h s."""
     for i in members:
         for k in range(3):
             now.velocity[i, k] += h * bodies.gravity[i, k]
+        if is_twisted(bodies, i):
+            x, y, z = turned(now.inv_inertia[i], bodies.torque[i])
+            t, w = bodies.torque[i], now.angular_velocity[i]
+            bodies.work[i] += h * (t[0] * (w[0] + 0.5 * h * x) + t[1] * (w[1] + 0.5 * h * y) + t[2] * (w[2] + 0.5 * h * z))
+            w[0] += h * x
+            w[1] += h * y
+            w[2] += h * z
 
 
 @jit

@@ -2,10 +2,10 @@
 
 A sub-step of length h, with J_0 the rows of contacts and joints at its start and the biases of `biases`:
 
-    v <- v + h/2 g
+    v <- v + h/2 g,   w <- w + h/2 I^-1 tau
     p:  u' = b + J_0 v + W p  obeys the laws of all rows (`newton`),   v <- v + M^-1 J_0^T p
     fly, and close the joints (`flight`)
-    v <- v + h/2 g
+    v <- v + h/2 g,   w <- w + h/2 I^-1 tau
 
 Where no contact acts this is the method of Verlet with constraints: of second order, and symplectic. Half of a step's gravity at each of
 its ends makes a free body's path the parabola. At the end of all sub-steps impulses nu make the rates of joints and closed contacts vanish:
@@ -76,7 +76,7 @@ def step_island(island, bodies, table, coefficients, balance, kept, sub_steps, h
     supports = _supports(bodies)
     left, step = sub_steps * h, h
     begin, spin = np.empty((bodies.part.shape[0], 7)), np.empty((bodies.part.shape[0], 3))
-    before = np.empty((bodies.part.shape[0], 6))
+    before = np.empty((bodies.part.shape[0], 7))
     set_inertia(bodies, now, members, stiffening)
     while left > LAST * h:
         step = min(step, left)
@@ -145,6 +145,7 @@ def _remember(bodies, now, members, begin, before):
             begin[i, k], before[i, k], before[i, 3 + k] = bodies.position[i, k], now.velocity[i, k], now.angular_velocity[i, k]
         for k in range(4):
             begin[i, 3 + k] = bodies.orientation[i, k]
+        before[i, 6] = bodies.work[i]
 
 
 @jit
@@ -154,6 +155,7 @@ def _take_back(bodies, now, members, begin, before):
             bodies.position[i, k], now.velocity[i, k], now.angular_velocity[i, k] = begin[i, k], before[i, k], before[i, 3 + k]
         for k in range(4):
             bodies.orientation[i, k] = begin[i, 3 + k]
+        bodies.work[i] = before[i, 6]
         quaternion_to_matrix(bodies.orientation[i], bodies.rotation[i])
 
 
