@@ -18,7 +18,7 @@ from rigidimpulse.scene.scene import Scene
 from rigidimpulse.scene.shape import Shape
 
 SIDE, CELLS = 1.6, 22
-AREA_DENSITY, STIFFNESS, BENDING, DAMPING = 0.3, 150.0, 2e-3, 0.1
+AREA_DENSITY, STIFFNESS, BENDING, DAMPING = 0.3, 150.0, 6e-3, 0.1
 RADIUS, CENTRE = 0.4, (0.0, 0.0, 0.75)
 START = (0.03, -0.02, 1.6)
 DURATION = 4.0

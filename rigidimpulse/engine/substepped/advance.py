@@ -282,12 +282,24 @@ class SubsteppedIslands:
             moves = lively(run.state.now, world.steady_strength, self.stepper.inner)
             judged = Judged(root, self.label >= 0, joined, _struck(run, joined, pair_events.begin), moves, solve_count)
             refused = refusals(world, judged, (near[0], near[1]), self._auto)
+        if self._world.force_tables and self._world.accuracy.contact_solver != "substepped":
+            # At a hit half of a sub-step's force acts on what the body was before it: gravity does little by that, a stiff controller much.
+            pulled = np.unique(root[joined & self._is_pulled_hard(run)]).tolist()
+            refused.update(dict.fromkeys([r for r in pulled if r >= 0], "strong forces at joints"))
         if refused:
             inside = self.stepper.inside_others(run, member & (self.label >= 0) & np.isin(root, list(refused)))
             refused = {r: reason for r, reason in refused.items() if r not in root[inside]}
         if self.hand_over.open.any():
             refused.update(dict.fromkeys(np.unique(root[member & self.hand_over.open]).tolist(), "joints that sub-steps do not close"))
         return refused
+
+    def _is_pulled_hard(self, run: Run) -> np.ndarray:
+        """Which bodies (n,) bool varying forces pulled or turned by more than gravity does, when they were evaluated last."""
+        world, acted, out = self._world, np.flatnonzero(run.forces.acts), np.zeros(self._world.num_bodies, bool)
+        force = np.abs(run.forces.value[acted])
+        turned = force[:, 3:].max(axis=1) * self.stepper.inner[acted] / world.inertia[acted].min(axis=1)
+        out[acted] = np.maximum(force[:, :3].max(axis=1) * world.inv_mass[acted], turned) > world.steady_strength[acted]
+        return out
 
     def _leave_out_fast(self, run: Run, member: np.ndarray) -> None:
         """Unmark those that are too fast for sub-steps; what joints and forces join stays together, and is given more of them."""

@@ -100,7 +100,7 @@ def check_arms(run: Recording) -> list[Check]:
         at_most("holds: drive's torque against gravity's, relative", abs(torque / (LOAD * math.cos(held[-1])) - 1.0), 1e-6, "balance"),
         at_most("holds: it passes the sag by, of it", held.max() / sag - 1.0, 1e-6, "overdamped: c > 2 sqrt(k I)"),
         at_most("holds: reaction without the weight, of it", np.abs(reaction).max() / (ARM_MASS * GRAVITY), 1e-6, "m g, straight up"),
-        at_most("lifts: error of the speed, of it", np.abs(speed - droop)[run.times > 0.5].max() / SPEED, 2e-5, "w - m g l sin(b) / c"),
+        at_most("lifts: error of the speed, of it", np.abs(speed - droop)[run.times > 0.5].max() / SPEED, 1e-5, "w - m g l sin(b) / c"),
         at_most("stalls: error of the highest turn, rad", abs(stalled.max() - high), 1e-3, "energy under the greatest torque"),
         at_most("stalls: error of the lowest turn, rad", abs(stalled[late].min() - low), 1e-3, "energy under the greatest torque"),
         at_most("stalls: above its speed, of it", run.angular_velocity("stalls")[:, 1].max() / SPEED - 1.0, 1e-3, "the drive brakes there"),
