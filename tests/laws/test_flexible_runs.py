@@ -156,6 +156,23 @@ def flat_landing() -> ri.Scene:
     return scene
 
 
+def test_a_cloth_that_is_caught_on_a_rim_does_not_jam() -> None:
+    """A cloth on a stool, and a ball on it: friction on the rim takes more than 100 iterations, and in two steps a halved step."""
+    x, y = (column.ravel() for column in np.meshgrid(np.linspace(-0.3, 0.3, 9), np.linspace(-0.3, 0.3, 9)))
+    corner = np.array([9 * j + i for j in range(8) for i in range(8)])[:, None]
+    faces = np.concatenate([corner + (0, 1, 10), corner + (0, 10, 9)])
+    scene = ri.Scene()
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static"))
+    scene.add(ri.Body("stool", ri.Shape.cylinder(0.15, 0.5), motion="static", position=(0, 0, 0.25)))
+    vertices = np.column_stack([x, y, np.full(81, 0.62)])
+    scene.add(ri.FlexibleBody("cloth", vertices, faces, stiffness=200, bending=1e-4, damping=0.002, area_density=0.2))
+    scene.add(ri.Body("ball", ri.Shape.sphere(0.05), position=(0, 0, 0.9), mass=0.2))
+    run = ri.simulate(scene, 1.0, fps=24)
+    assert run.status.ok, run.status.message
+    apart = np.linalg.norm(run.soft_body("cloth")[0] - run.position("ball")[:, None], axis=2)
+    assert apart.min() > 0.05  # it lies on the cloth
+
+
 def test_round_off_is_no_energy_out_of_nothing() -> None:
     # 1e-15 J of 1 J: reported when it was compared with what was left after the landing, which is nothing.
     run = ri.simulate(flat_landing(), 0.5)

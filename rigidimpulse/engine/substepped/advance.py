@@ -210,8 +210,8 @@ class SubsteppedIslands:
 
         Returns the pairs of a step that has begun and that the loop must finish; else None.
         """
-        # Nobody looks at the run between such steps, and members without joints are asked for.
-        watched = run.plan.observe or run.soft_bodies.moves or self._stays.any() or self._wedged.any() or bool(self._world.force_tables)
+        # Nobody looks at the run between such steps, no force is evaluated, and members without joints are asked for.
+        watched = run.plan.observe or self._world.force_tables or self._jointed.any() or self._wedged.any()
         if watched or not self._taken.any() or not is_undisturbed(run.state.trajectory, self._world.constants):
             return None
         with run.plan.clock(NAME):
