@@ -195,6 +195,9 @@ class NoTriggers:
     def look(self, _begin: float, _end: float) -> None:
         """Nobody looks."""
 
+    def turn(self, _bodies: np.ndarray, _time: float) -> None:
+        """Nobody asks where they were before."""
+
 
 class NoKeyframes:
     """A run in which no body has keyframes."""

@@ -60,7 +60,7 @@ def _islands(run: Run, pair_events: PairEvents, time: float, reached: np.ndarray
     owner = root[np.where(world.dynamic[integer[:, 0]], integer[:, 0], integer[:, 1])]
     joints = run.joints.at(np.flatnonzero(reached & world.dynamic))
     # Forces on sub-stepped bodies are those of their sub-steps.
-    tied = np.flatnonzero(reached & run.forces.acts & (run.substepped.label < 0))
+    tied = np.flatnonzero(reached & run.forces.acts & world.dynamic & (run.substepped.label < 0))
     owner_of_joint = root[np.array([run.joints.movable_end(j) for j in joints.tolist()], np.int64)]
     owners = np.union1d(owner, owner_of_joint)
     first, last = owner.searchsorted(owners, side="left"), owner.searchsorted(owners, side="right")

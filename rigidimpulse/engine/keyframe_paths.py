@@ -59,6 +59,9 @@ class KeyframePaths:
                 v = (centre[k + 1] - centre[k]) / h
                 w = rotation_vector(multiply(principal[k + 1], conjugate(principal[k]))) / h
             self.segments.append((float(times[k]), i, (centre[k], principal[k], v, w)))
+            if times[k] <= 0.0:
+                # Frame 0 has the velocity with which the body sets out.
+                world.velocity[i], world.angular_velocity[i] = v, w
 
     def next_key(self, time: float) -> float:
         """The first key time after `time`, inf if there is none."""
@@ -102,7 +105,9 @@ def _let_go(run: Run, i: int, time: float) -> None:
     """Body i is dynamic from `time` on."""
     world, trajectory, now = run.world, run.state.trajectory, run.state.now
     state_at(trajectory, i, time, now.position[i], now.orientation[i], now.velocity[i], now.angular_velocity[i])
-    world.dynamic[i], world.moving[i], world.inv_mass[i] = True, False, 1.0 / world.mass[i]
+    world.dynamic[i], world.moving[i] = True, False
+    run.forces.weigh(np.array([i]), time)  # it may have burnt fuel since it was weighed
+    world.inv_mass[i] = 1.0 / world.mass[i]
     trajectory.position[i], trajectory.orientation[i] = now.position[i], now.orientation[i]
     trajectory.velocity[i], trajectory.angular_velocity[i] = now.velocity[i], now.angular_velocity[i]
     trajectory.acceleration[i], trajectory.start[i], trajectory.mode[i] = world.steady_acceleration[i], time, FREE

@@ -348,6 +348,10 @@ class Observer(Protocol):
         """Look at what happened in the step from `begin` to `end` [s]."""
         ...
 
+    def turn(self, bodies: np.ndarray, time: float, /) -> None:
+        """Keep the trajectories of bodies that get others at `time` [s]."""
+        ...
+
 
 class Keyframed(Protocol):
     """The paths of kinematic bodies: `KeyframePaths`, or `NoKeyframes`."""

@@ -11,12 +11,18 @@ The exact regime is more accurate, so it is used wherever it can be afforded. "a
                 times a step, in the mean of the last ones; EXPENSIVE_JOINTED times where it has less than FEW bodies and was in no
                 contact in the last step: a door on a soft hinge takes up to 9 though it touches nothing. Where nothing is near it
                 EXPENSIVE_SWING times, by as much less often as it has more bodies than SMALL. A body that hangs alone stays exact,
-                and so does what rolling friction may act on
+                and so do islands with joints in scenes with rolling friction
     or runaway  in the middle of a step, an island of which a body was solved more than RUNAWAY times in the step, or by as much less
                 often as it has more bodies than LARGE: it costs more than it advances. So do islands in which two bodies come to contact
                 again and again and no impulse keeps them apart. They are handed over at that instant, whatever they are made of.
                 Contacts that rebound by more than REBOUND, without joints, are given more of them: many impacts are what such scenes
                 are about. So are neighbours of masses beyond RATIO : 1, which sub-steps may throw apart
+
+and, at every step,
+
+    sliding     no rolling or spinning friction between two bodies that may touch, as sub-steps have none; in an island of ROLLING bodies at
+                most: exact contact of 512 balls took minutes a step. Larger islands, and those that run away, go without, and the
+                status says so
 
 and, where an island begins to be sub-stepped (a body that comes near later is taken in):
 
@@ -53,6 +59,7 @@ EXPENSIVE_SOLVES, EXPENSIVE_TALL = 6.0, 16.0
 EXPENSIVE_JOINTED, EXPENSIVE_SWING, SMALL = 16.0, 300.0, 8.0
 RATIO, REBOUND, ELASTIC, TALL = 30.0, 0.5, 0.9, 12
 CROWD, PAIRS = 128, 4.0
+ROLLING = 128
 FAST, SPIN = 0.5, 2.5 / 16.0
 
 
@@ -180,6 +187,11 @@ def lively(now: BodyState, strength: np.ndarray, inner: np.ndarray) -> np.ndarra
     return speed > SLEEP_SPEED * np.sqrt(strength * radius)
 
 
+def roll(world: World, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Which pairs (k,) bool of bodies a and b (k,) have rolling or spinning friction, in a scene with some."""
+    return world.rolling[world.material_of_body[a], world.material_of_body[b]].any(axis=1)
+
+
 def unlike(world: World, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Which pairs (k,) bool of bodies a and b (k,) are both dynamic, of masses beyond RATIO : 1."""
     heavy = np.maximum(world.mass[a], world.mass[b]) > RATIO * np.minimum(world.mass[a], world.mass[b])
@@ -230,7 +242,10 @@ def refusals(world: World, bodies: Judged, pairs: tuple[np.ndarray, np.ndarray],
     swings = EXPENSIVE_SWING / np.maximum(size / SMALL, 1.0)
     near = np.where((size < FEW) & ~is_struck, EXPENSIVE_JOINTED, EXPENSIVE_SOLVES)
     cheap = solves <= np.where(touches, near, swings)
-    # Sub-steps have no rolling friction.
+    # Sub-steps have no rolling and no spinning friction.
+    if world.rolling.size:
+        rolls = roll(world, a, b)
+        out.update(dict.fromkeys(np.unique(owner[rolls & (size[owner] <= ROLLING)]).tolist(), "rolling friction"))
     stays_exact = np.full(len(root), True) if world.rolling.size else cheap | (size < KEPT)
     for r in np.flatnonzero(has_joints & ~was_substepped & stays_exact).tolist():
         out[r] = "joints"

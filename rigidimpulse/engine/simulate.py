@@ -69,7 +69,8 @@ def simulate(
             where they are free or in exact contact; see docs/guide/caches.md.
 
     Returns:
-        The recording, with round(duration * fps) + 1 frames; the first is the initial state. Ctrl-C stops the run after the step that it is
+        The recording, with round(duration * fps) + 1 frames at multiples of 1 / fps; the first is the initial state. A duration of less
+        than half of 1 / fps gives that one alone. Ctrl-C stops the run after the step that it is
         in, or the steps that are taken at once: the recording has the frames until then, and its status is not ok and says "partial". A
         second Ctrl-C raises KeyboardInterrupt.
 

@@ -2,14 +2,15 @@
 
 Overlap is tested at the start of the run, at the end of each step, and at times inside the step. The tests are so close in time that
 neither side moves by more than half the thickness of both between two of them. Where the answer changes, bisection finds the time to
-`SHARPNESS`. Inside the step bodies are taken on the trajectory that they had at its begin until their first impact, and on that which they
-have at its end since their last one; between these two, in a step with several, they go straight.
+`SHARPNESS`. Inside the step bodies are taken on all the trajectories that they had in it. Of those of the compiled order of events only the
+first and the last are kept: where a body has several impacts in a step and nothing else acts on it, it goes straight between the first and
+the last of them.
 """
 
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, field
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -89,6 +90,15 @@ class _Watched:
     inside: set[int] = field(default_factory=set)
 
 
+class _Leg(NamedTuple):
+    """A body `row` on a trajectory from `start` to `end`, s."""
+
+    trajectory: Trajectories
+    row: int
+    start: float
+    end: float
+
+
 class Triggers:
     """All triggers of a run.
 
@@ -116,18 +126,39 @@ class Triggers:
                 may[body] = False
             reach, thick = _reach(trigger.shape), _thickness(trigger.shape)
             self._watched.append(_Watched(trigger, body, len(world.shapes) + number, reach, thick, np.flatnonzero(may)))
+        self._is_watched = np.zeros(world.num_bodies, bool)
+        for watched in self._watched:
+            self._is_watched[watched.may] = True
+            self._is_watched[watched.body] |= watched.body >= 0
+        self._legs: dict[int, list[_Leg]] = {}
+        self._fastest = np.zeros((world.num_bodies, 2))
         self._impacts_seen = 0
         self._turned = np.full(world.num_bodies, np.inf)
-        self._before = _copy(run.state.trajectory)
+        self._before, self._began = _copy(run.state.trajectory), run.state.time
         self.look(run.state.time, run.state.time)
 
     def look(self, begin: float, end: float) -> None:
         """Look at what happened in the step from `begin` to `end` [s]."""
+        self._began = begin
         self._note_impacts()
         for watched in self._watched:
             for i in self._near(watched, begin, end):
                 self._follow(watched, i, begin, end)
         self._before = _copy(self._run.state.trajectory)
+        for i in self._legs:
+            self._fastest[i] = 0.0
+        self._legs.clear()
+
+    def turn(self, bodies: np.ndarray, time: float) -> None:
+        """Keep the trajectories of bodies that get others at `time` [s]."""
+        trajectory = self._run.state.trajectory
+        for i in bodies[self._is_watched[bodies]].tolist():
+            start = float(trajectory.start[i])
+            if time > start:
+                kept = Trajectories(*(array[i : i + 1].copy() for array in trajectory))
+                self._legs.setdefault(i, []).append(_Leg(kept, 0, start, time))
+                fast = float(_speeds(kept, np.array([0]), time)[0]), float(np.linalg.norm(kept.angular_velocity[0]))
+                self._fastest[i] = np.maximum(self._fastest[i], fast)
 
     def _note_impacts(self) -> None:
         """When the trajectories at the begin of the step ended: at the first impact, or where those at its end start."""
@@ -145,7 +176,7 @@ class Triggers:
         if not np.isfinite(watched.reach):
             return i.tolist()
         # Bound of the speed of the centre in the step.
-        way = np.max([_speeds(trajectory, i, end) for trajectory in trajectories], axis=0)
+        way = np.maximum(np.max([_speeds(trajectory, i, end) for trajectory in trajectories], axis=0), self._fastest[i, 0])
         centre, _ = self._pose(watched, end)
         own = watched.body
         if own >= 0:
@@ -154,6 +185,7 @@ class Triggers:
             for trajectory in trajectories:
                 turn = np.linalg.norm(trajectory.angular_velocity[own])
                 way = way + _speeds(trajectory, np.array([own]), end) + 2.0 * away * turn
+            way = way + self._fastest[own, 0] + 2.0 * away * self._fastest[own, 1]
         place = np.array([self._body(k, end)[0] for k in i.tolist()]).reshape(-1, 3)
         near = np.linalg.norm(place - centre, axis=1) <= watched.reach + world.bound_radius[i] + way * (end - begin)
         return sorted({*i[near].tolist(), *watched.inside})
@@ -199,7 +231,8 @@ class Triggers:
         """Bound of the speed of any point of a body on the trajectories of a step, m/s."""
         if i < 0:
             return 0.0
-        reach, fastest = float(self._run.world.bound_radius[i]) if reach is None else reach, 0.0
+        reach = float(self._run.world.bound_radius[i]) if reach is None else reach
+        fastest = float(self._fastest[i, 0]) + float(self._fastest[i, 1]) * (reach if np.isfinite(reach) else 0.0)
         for trajectory in (self._before, self._run.state.trajectory):
             if trajectory.mode[i] != FIXED:
                 spin = float(np.linalg.norm(trajectory.angular_velocity[i])) * (reach if np.isfinite(reach) else 0.0)
@@ -208,16 +241,19 @@ class Triggers:
 
     def _body(self, i: int, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Principal frame of a body."""
-        trajectory, turned = self._run.state.trajectory, float(self._turned[i])
-        start = float(trajectory.start[i])
-        if time >= start:
-            return _pose_on(trajectory, i, time)
-        if time <= turned:
-            return _pose_on(self._before, i, time)
-        (x_0, q_0), (x_1, q_1) = _pose_on(self._before, i, turned), _pose_on(trajectory, i, start)
-        share = (time - turned) / (start - turned)
-        q = (1.0 - share) * q_0 + share * (q_1 if dot(q_0, q_1) >= 0.0 else -q_1)
-        return (1.0 - share) * x_0 + share * x_1, q / length(q)
+        legs, trajectory = self._legs.get(i, []), self._run.state.trajectory
+        if not legs or legs[0].start > self._began:
+            # What it began the step on was not kept.
+            turned = min(float(self._turned[i]), legs[0].start if legs else np.inf)
+            legs = [_Leg(self._before, i, -np.inf, turned), *legs]
+        earlier = None
+        for leg in (*legs, _Leg(trajectory, i, float(trajectory.start[i]), np.inf)):
+            if time < leg.start and earlier is not None:
+                return _between(earlier, leg, time)
+            if time <= leg.end:
+                return _pose_on(leg.trajectory, leg.row, time)
+            earlier = leg
+        raise AssertionError("the last trajectory has no end")
 
     def _pose(self, watched: _Watched, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Frame of a trigger."""
@@ -244,6 +280,14 @@ def _pose_on(trajectory: Trajectories, i: int, time: float) -> tuple[np.ndarray,
     x, q = np.empty(3), np.empty(4)
     pose_at(trajectory, i, max(time, float(trajectory.start[i])), x, q)
     return x, q / length(q)
+
+
+def _between(first: _Leg, second: _Leg, time: float) -> tuple[np.ndarray, np.ndarray]:
+    """Principal frame of a body at `time` [s] on a straight way from the end of one trajectory to the start of another."""
+    (x_0, q_0), (x_1, q_1) = _pose_on(first.trajectory, first.row, first.end), _pose_on(second.trajectory, second.row, second.start)
+    share = (time - first.end) / (second.start - first.end)
+    q = (1.0 - share) * q_0 + share * (q_1 if dot(q_0, q_1) >= 0.0 else -q_1)
+    return (1.0 - share) * x_0 + share * x_1, q / length(q)
 
 
 def _corners(shape: Shape) -> tuple[np.ndarray, np.ndarray] | None:

@@ -13,6 +13,9 @@ acting forces changes; that time is found by bisection along the trajectory, to 
 length (`Accuracy.integrator`) do not end early.
 
 The impulse, the angular impulse about the world's origin and the work of each force are integrals of its line along the trajectory.
+
+A body that is held until its release follows its own path. What forces do to it is the business of what holds it: no work is counted
+until it is let go. Forces between it and others are evaluated where it is.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.dynamics.forces.force import ForceTable, Instant
 from rigidimpulse.dynamics.forces.force_log import ForceLog, ForceWork
@@ -33,7 +37,7 @@ from rigidimpulse.model.world import World
 from rigidimpulse.motion.body_state import BodyState
 from rigidimpulse.motion.evaluate import refresh_pose
 from rigidimpulse.motion.force_step import Lines, Stage, Workspace, nystroem, semi_implicit
-from rigidimpulse.motion.trajectory import Trajectories
+from rigidimpulse.motion.trajectory import Trajectories, state_at
 from rigidimpulse.recording.recorder import Recorder
 
 IN_FLIGHT, IN_CONTACT, IN_SUB_STEPS = 0.03, 3.0, 300.0
@@ -82,6 +86,7 @@ class VaryingForces:
         self._restless = np.zeros(n, bool)
         for table in self._tables:
             self._restless[table.body] |= not table.is_steady
+        self._carried = np.array([i for i, body in enumerate(world.scene.bodies) if body.release_time is not None], np.int64)
         self._trajectory = trajectory
         self._workspace = Workspace(trajectory, world.inv_mass)
         self._longest = np.full(n, world.accuracy.step)
@@ -129,7 +134,7 @@ class VaryingForces:
 
     def may_rest(self, bodies: np.ndarray) -> bool:
         """Whether the forces on bodies at rest stay as they are."""
-        return not self._restless[bodies].any()
+        return not self._restless[bodies].any() and not len(self._held_beside(bodies))
 
     def fly(self, run: Run, members: np.ndarray, time: float, end: float) -> np.ndarray:
         """Forces on members that nothing holds, from `time` to `end` at most, into `value` and `rate`; returns for how long, (m,) s."""
@@ -140,7 +145,7 @@ class VaryingForces:
         if self._world.accuracy.integrator != "exact":
             return self._fly_one_length(members, time, min(rest, self._world.accuracy.step), state)
         for table in self._switching:
-            table.freeze(Instant(np.full(len(self.acts), time), now, state.rotation, self._trajectory))
+            table.freeze(self._instant(np.full(len(self.acts), time), members, now, state.rotation))
         switches = 0
         h = np.zeros(len(self.acts))
         h[members] = _pieces(rest, self._together(members, self._plan[members], np.minimum))
@@ -204,7 +209,7 @@ class VaryingForces:
 
         def differ(part: float) -> bool:
             workspace.look(members, part * length)
-            at = Instant(np.full(len(self.acts), time + part * length), workspace.bodies, workspace.rotation, self._trajectory)
+            at = self._instant(np.full(len(self.acts), time + part * length), members, workspace.bodies, workspace.rotation)
             return any(table.switched(at) for table in self._switching)
 
         if not differ(1.0):
@@ -328,7 +333,7 @@ class VaryingForces:
         """Forces of all rows (k, 6), 0 for those of other bodies, and their sums (n, 6) on bodies of the mass of now; time (n,) s."""
         value, asked = np.zeros((len(self._body), 6)), np.zeros(len(self.acts), bool)
         asked[members] = True
-        at = Instant(time, bodies, rotation, self._trajectory)
+        at = self._instant(time, members, bodies, rotation)
         for table, first, clock in zip(self._tables, self._first[:-1], self._clocks, strict=True):
             rows = np.flatnonzero(asked[table.body])
             if len(rows):
@@ -337,6 +342,20 @@ class VaryingForces:
         total = np.zeros((len(self.acts), 6))
         np.add.at(total, self._body, value)
         return value, total if self.flow is None else total * self.flow.since_weighed(time)[:, None]
+
+    def _instant(self, time: np.ndarray, members: np.ndarray, bodies: BodyState, rotation: np.ndarray) -> Instant:
+        """What forces on members are evaluated at; bodies that are held beside them are brought there."""
+        for i in self._held_beside(members).tolist():
+            mate = members[self._component[members] == self._component[i]][0]
+            x, q, v, w = bodies.position[i], bodies.orientation[i], bodies.velocity[i], bodies.angular_velocity[i]
+            state_at(self._trajectory, i, float(time[mate]), x, q, v, w)
+            rotation[i] = to_matrix(q)
+        return Instant(time, bodies, rotation, self._trajectory)
+
+    def _held_beside(self, members: np.ndarray) -> np.ndarray:
+        """Bodies that are held until their release, and that forces tie to members."""
+        held = self._carried[~self._world.dynamic[self._carried]] if len(self._carried) else self._carried
+        return held[np.isin(self._component[held], self._component[members])] if len(held) else held
 
     def _errors(self, bodies: BodyState, members: np.ndarray, off: np.ndarray, h: np.ndarray, part: float) -> np.ndarray:
         """Errors (m,) of the members' poses by wrenches that are off by (n, 6) over h (m,) s, relative to the size."""

@@ -84,6 +84,30 @@ def test_a_shot_through_a_gate_that_hits_a_wall_in_the_same_step(restitution: fl
     assert np.allclose(overlaps(ri.simulate(scene, 0.3), "gate", "shot"), there + back, rtol=0, atol=SHARP)
 
 
+@pytest.mark.parametrize("stiffness", [100.0, 1000.0])
+def test_a_gate_on_the_way_of_a_ball_on_a_spring(stiffness: float) -> None:
+    """x = cos(w t) in steps that many trajectories make up: 2e-8 s. It was taken to go straight between those that are not the last."""
+    w = math.sqrt(stiffness)
+    scene = ri.Scene(gravity=(0, 0, 0), bodies=[ri.Body("ball", ri.Shape.sphere(0.05), mass=1.0, position=(1, 0, 0))])
+    scene.add(ri.PDController("ball", position=(0, 0, 0), stiffness=stiffness))
+    scene.add(ri.Trigger("gate", ri.Shape.sphere(0.05), position=(0.3, 0, 0)))
+    once = [math.acos(0.4), math.acos(0.2), 2 * math.pi - math.acos(0.2), 2 * math.pi - math.acos(0.4)]
+    times = [t for turn in range(3) for angle in once if (t := (angle + 2 * math.pi * turn) / w) < 0.65]
+    events = [event.time for event in ri.simulate(scene, 0.65).status.events if event.kind in ("overlap begins", "overlap ends")]
+    assert len(events) >= len(times)
+    assert np.allclose(events[: len(times)], times, rtol=0, atol=2e-8)
+
+
+def test_a_gate_below_a_ball_that_falls_through_air() -> None:
+    """v_t^2 / g ln cosh(g t / v_t) with quadratic drag: 1e-7 s, of 3 s."""
+    scene = ri.Scene(gravity=(0, 0, -G), bodies=[ri.Body("ball", ri.Shape.sphere(0.05), mass=0.1, position=(0, 0, 20))])
+    scene.add(ri.Drag(quadratic=0.05))
+    scene.add(ri.Trigger("gate", ri.Shape.box((1, 1, 0.1)), position=(0, 0, 5)))
+    terminal = math.sqrt(0.1 * G / 0.05)
+    times = [terminal / G * math.acosh(math.exp(way * G / terminal**2)) for way in (14.9, 15.1)]
+    assert np.allclose(overlaps(ri.simulate(scene, 5.0), "gate", "ball"), times, rtol=0, atol=1e-7)
+
+
 def test_a_trigger_on_a_body() -> None:
     """It hangs 1 m ahead of a turning arm: a post at (0, 1, 0) is met a quarter of a turn later. Its own body is not reported."""
     spin, reach = 2.0, 0.1

@@ -191,3 +191,14 @@ def test_damping_along_a_held_direction_does_not_swing_up() -> None:
     assert run.status.ok, run.status.message
     np.testing.assert_allclose(run.contact_force("block")[10:-1], np.broadcast_to((0, 0, 0.981), (50, 3)), rtol=0, atol=1e-6)
     np.testing.assert_allclose(run.position("block")[:, 0], run.times, rtol=0, atol=1e-12)
+
+
+def test_a_stiff_spring_in_free_flight_is_never_handed_to_sub_steps() -> None:
+    """x = cos(100 t): 1e-6 m. Where nothing touches anything it went to sub-steps, since forces are evaluated so often, and was lost."""
+    scene = ri.Scene(gravity=(0, 0, 0))
+    scene.add(ri.Body("post", ri.Shape.sphere(0.01), motion="static", position=(-2, 0, 0)))
+    scene.add(ri.Body("ball", ri.Shape.sphere(0.05), mass=1.0, position=(1, 0, 0)))
+    scene.add(ri.Spring("post", "ball", anchor_a=(-2, 0, 0), anchor_b=(1, 0, 0), stiffness=1e4, rest_length=2.0))
+    run = ri.simulate(scene, 0.3)
+    np.testing.assert_allclose(run.position("ball")[:, 0], np.cos(100.0 * run.times), rtol=0, atol=1e-6)
+    assert not any(event.kind == "handed to sub-steps" for event in run.status.events)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -26,8 +28,8 @@ def test_it_flies_on_with_the_velocity_of_its_keys():
     after = np.maximum(run.times - release, 0.0)[:, None]
     expected = np.array([0.0, 0.0, 5.0]) + v * run.times[:, None] + 0.5 * G * after**2
     np.testing.assert_allclose(run.position("thrown"), expected, rtol=0, atol=1e-13)
-    # Frame 0 is the state as given, before the first key.
-    np.testing.assert_allclose(run.velocity("thrown")[1:], (v + G * after)[1:], rtol=0, atol=1e-13)
+    # In frame 0, too, in which it had none.
+    np.testing.assert_allclose(run.velocity("thrown"), v + G * after, rtol=0, atol=1e-13)
 
 
 def test_it_spins_on():
@@ -84,6 +86,78 @@ def test_joints_and_forces_hold_it_from_then_on():
     np.testing.assert_allclose(np.linalg.norm(arm, axis=1), 1.0, atol=1e-6)
 
 
+def held(**more):
+    """A box of 2 kg that is carried at 1 m/s until 1 s, 3 m from a post."""
+    box = ri.Body(
+        "held", ri.Shape.box((0.2, 0.2, 0.2)), motion="kinematic", mass=2.0, position=(0, 0, 5), velocity=(1, 0, 0), release_time=1.0
+    )
+    box = replace(box, **more)
+    return ri.Scene(bodies=[box, ri.Body("post", ri.Shape.sphere(0.1), motion="static", position=(0, 3, 5))])
+
+
+def test_a_rocket_waits_until_it_is_let_go_and_has_the_mass_of_that_instant():
+    """Lit at 0.5 s, let go at 1 s: it stands until then, then v = u ln(m_1 / m) - g (t - 1) from then on, 1e-9 m/s. It fell."""
+    scene = held(mass=10.0, velocity=(0, 0, 0))
+    scene.add(ri.Thruster("held", 200.0, 2.0, (0, 0, 1), 6.0, start=0.5))
+    run = ri.simulate(scene, 1.5, 60.0)
+    waits = run.times <= 1.0
+    np.testing.assert_array_equal(run.position("held")[waits], np.tile((0, 0, 5), (waits.sum(), 1)))
+    np.testing.assert_array_equal(run.velocity("held")[waits], np.zeros((waits.sum(), 3)))
+    t = run.times[~waits]
+    expected = 200.0 * np.log(9.0 / (10.0 - 2.0 * (t - 0.5))) - 9.81 * (t - 1.0)
+    np.testing.assert_allclose(run.velocity("held")[~waits, 2], expected, rtol=0, atol=1e-9)
+    assert run.status.ok
+
+
+@pytest.mark.parametrize(
+    "force",
+    [
+        ri.Drag(linear=1.0),
+        ri.HarmonicForce("held", 3.0, 1.0, (0, 1, 0)),
+        ri.PDController("held", position=(0, 0, 0), stiffness=10.0),
+        ri.Spring("post", "held", anchor_a=(0, 3, 5), anchor_b=(0, 0, 5), stiffness=20.0, rest_length=2.0),
+    ],
+    ids=["drag", "harmonic", "controller", "spring"],
+)
+def test_forces_do_not_move_what_is_held_and_do_no_work(force):
+    """Under a force that varies it fell with g from the start: 4.9 m in 1 s. Energy that nobody had given was in the ledger."""
+    scene = held()
+    scene.add(force)
+    run = ri.simulate(scene, 2.0, 60.0)
+    waits = run.times <= 1.0
+    path = run.times[waits, None] * np.array([1.0, 0.0, 0.0]) + (0.0, 0.0, 5.0)
+    np.testing.assert_allclose(run.position("held")[waits], path, rtol=0, atol=1e-14)
+    work = {cause: taken for cause, taken in run.ledger.dissipated.items() if cause != "let go" and "spring" not in cause}
+    assert all(np.all(taken[waits] == 0.0) for taken in work.values())
+    whole = run.ledger.total + sum(run.ledger.dissipated.values())
+    np.testing.assert_allclose(whole, whole[0], rtol=0, atol=1e-6)
+    assert run.status.ok
+    # As if it had been dynamic with that pose and velocity: 1e-6 m, of 5 m that it falls.
+    free = ri.Scene(bodies=[ri.Body("held", ri.Shape.box((0.2, 0.2, 0.2)), mass=2.0, position=(1, 0, 5), velocity=(1, 0, 0))])
+    if isinstance(force, ri.Drag):
+        free.add(force)
+        fall = ri.simulate(free, 1.0, 60.0).position("held")[-1]
+        np.testing.assert_allclose(run.position("held")[-1], fall, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("floor", [False, True])
+def test_a_spring_to_what_is_held_pulls_as_one_to_what_is_carried(floor):
+    """Until the release it is a support. The work on the held end was counted, too: 0.36 J, "energy made"; and it was taken to fall."""
+    pulled, amounts = [], []
+    for release in (None, 5.0):
+        scene = held(release_time=release, position=(0, 0, 0.5))
+        scene.add(ri.Body("free", ri.Shape.box((0.2, 0.2, 0.2)), mass=1.0, position=(-0.5, 0, 0.1)))
+        scene.add(ri.Spring("held", "free", anchor_a=(0, 0, 0.5), anchor_b=(-0.5, 0, 0.1), stiffness=10.0, rest_length=0.6))
+        if floor:
+            scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=ri.Material(static_friction=0.3)))
+        run = ri.simulate(scene, 1.5, 60.0)
+        assert run.status.ok
+        pulled.append(run.position("free"))
+        amounts.append(run.ledger.dissipated["spring held - free"])
+    np.testing.assert_allclose(pulled[0], pulled[1], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(amounts[0], amounts[1], rtol=0, atol=1e-9)
+
+
 def test_the_ledger_counts_it_from_then_on():
     scene = ri.Scene(bodies=[ri.Body("floor", ri.Shape.half_space(), motion="static"), carried((2, 0, 1), 0.51)])
     run = ri.simulate(scene, 2.5, 60.0)
@@ -133,8 +207,6 @@ def test_the_same_bits_with_a_cache_that_is_gone_on_with(tmp_path):
     ],
 )
 def test_what_cannot_be_let_go_is_refused(change, words):
-    from dataclasses import replace
-
     with pytest.raises(ri.SceneError, match=words):
         ri.simulate(ri.Scene(bodies=[replace(carried((0, 0, 0), 0.5), **change)]), 0.1)
 

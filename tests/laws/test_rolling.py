@@ -98,6 +98,23 @@ def test_joined_wheels_roll_to_rest() -> None:
     np.testing.assert_allclose(run.position("wheel0")[:, 0], v * t - 0.5 * a * t * t, atol=1e-4)
 
 
+def test_a_plate_on_sixty_four_balls_is_slowed_down() -> None:
+    """a = b g (2 M + n m) / (2 R (M + 0.35 n m)), 2 %: an island that large was sub-stepped, where nothing slowed it down at all."""
+    b, plate, n = 0.004, 20.0, 64
+    scene = ri.Scene(gravity=(0, 0, -G))
+    scene.add(ri.Body("floor", ri.Shape.half_space(), motion="static", material=ri.Material(static_friction=0.9)))
+    material = ri.Material(rolling_friction=b)
+    for k in range(n):
+        rolls = {"velocity": (0.5, 0, 0), "angular_velocity": (0, 5.0, 0), "mass": 1.0, "material": material}
+        scene.add(ri.Body(f"ball{k}", ri.Shape.sphere(0.1), position=(k % 8 * 0.25 - 0.9, k // 8 * 0.25 - 0.9, 0.1), **rolls))
+    shape = ri.Shape.box((2.5, 2.5, 0.1))
+    scene.add(ri.Body("plate", shape, mass=plate, position=(0, 0, 0.25), velocity=(1, 0, 0), material=material))
+    run = ri.simulate(scene, 0.4)
+    a = b * G * (2 * plate + n) / (0.2 * (plate + 0.35 * n))
+    assert run.velocity("plate")[-1, 0] == pytest.approx(1.0 - 0.4 * a, abs=0.02 * 0.4 * a)
+    assert run.status.ok
+
+
 @pytest.mark.parametrize("name", ["rolling_friction", "spinning_friction"])
 def test_negative_lengths_are_refused(name: str) -> None:
     scene = ri.Scene(bodies=[ri.Body("ball", ri.Shape.sphere(R), material=ri.Material(**{name: -0.1}))])

@@ -61,5 +61,6 @@ class MassFlow:
             share = self.share(np.full(len(self._mass), time))[losing]
             self._weighed[losing] = share
             self._world.mass[losing] = share * self._mass[losing]
-            self._world.inv_mass[losing] = 1.0 / self._world.mass[losing]
+            # What is held until its release gives way to nothing, whatever its mass.
+            self._world.inv_mass[losing] = np.where(self._world.dynamic[losing], 1.0 / self._world.mass[losing], 0.0)
             self._trajectory.inertia[losing] = self._world.inertia[losing] = share[:, None] * self._inertia[losing]

@@ -84,6 +84,7 @@ def _are_steady(run: Run, members: np.ndarray) -> bool:
 def _begin_steady(run: Run, pair_events: PairEvents, members: np.ndarray, time: float, rests: bool) -> None:
     """New trajectories for members on which nothing that varies acts, as `begin_trajectory` makes them, in one kernel."""
     state, world, done = run.state, run.world, 0
+    run.triggers.turn(members, time)
     run.log.reserve(stretches=len(members))
     while done < len(members):
         passage = Passage(
@@ -139,6 +140,7 @@ def begin_trajectory(run: Run, pair_events: PairEvents, i: int, time: float, hel
     if not isfinite(float(now.velocity[i].sum() + now.angular_velocity[i].sum())):
         run.quarantine(i, time)
         rests = True
+    run.triggers.turn(np.array([i]), time)
     run.recorder.flush(trajectory, i, time, state.correction[i])
     state.correction[i] = 0.0
     run.contact_log.close(np.array([i]), time)

@@ -43,6 +43,7 @@ from rigidimpulse.engine.regime import (
     may_begin,
     only_expensive,
     refusals,
+    roll,
     solves_in_islands,
     support_levels,
 )
@@ -67,6 +68,9 @@ from rigidimpulse.motion.trajectory import FIXED, LINEAR
 
 NAME = "sub-stepped islands"
 """What `explain` calls them."""
+WITHOUT_ROLLING = (
+    "rolling and spinning friction do not act in sub-stepped islands, as large piles are: contact_solver='newton' has it, and may take long"
+)
 REST = 3.0
 """For how long members must have hardly moved to be sleepy, in sqrt(r / g), see `sleeping.py`."""
 LEAVING = 0.1
@@ -123,6 +127,7 @@ class SubsteppedIslands:
         self._outcomes: list[tuple[Outcome, float]] = []
         self._outcome_begin = 0.0
         self._refused: dict[str, int] = {}
+        self._said_it = False
         self._solved_again, self._wedged = 0, np.zeros(world.num_bodies, np.int64)
 
     @cached_property
@@ -268,6 +273,7 @@ class SubsteppedIslands:
             self._refused[reason] = self._refused.get(reason, 0) + 1
         if refused:
             self.label[member & ~chosen] = -1
+        self._say_what_does_not_roll(run, chosen, near, time)
         self._settle(run, chosen, near, links, time)
         return chosen
 
@@ -292,6 +298,18 @@ class SubsteppedIslands:
         if self.hand_over.open.any():
             refused.update(dict.fromkeys(np.unique(root[member & self.hand_over.open]).tolist(), "joints that sub-steps do not close"))
         return refused
+
+    def _say_what_does_not_roll(self, run: Run, chosen: np.ndarray, near: np.ndarray, time: float) -> None:
+        """Report once that rolling friction does not act in sub-stepped islands, where it would on chosen bodies (n,) bool."""
+        world, (a, b) = self._world, near[:2]
+        if not world.rolling.size or self._said_it or not chosen.any():
+            return
+        rolls = (chosen[a] | chosen[b]) & roll(world, a, b)
+        if rolls.any():
+            self._said_it = True
+            bodies = np.union1d(a[rolls], b[rolls])
+            names = tuple(world.names[i] for i in bodies[world.dynamic[bodies]].tolist())
+            run.log.report(time, "effect left out", names, WITHOUT_ROLLING)
 
     def _is_pulled_hard(self, run: Run) -> np.ndarray:
         """Which bodies (n,) bool varying forces pulled or turned by more than gravity does, when they were evaluated last."""

@@ -3,6 +3,7 @@
 It is counted how often the exact regime deals with each body in a step. An island of k bodies runs away where a count is above
 `most_solves(k)`: it is sub-stepped from that instant on. So are bodies that no impulse keeps apart, at once. Not handed over are
 
+    bodies that touch nothing and that no joint holds, however often stiff forces are evaluated on their way: that is not counted,
     islands in which much rebounds, or whose neighbours are too unlike in mass for sub-steps, until they are dealt with much more often,
     islands pressed by what has a path of its own: sub-steps would shoot out what is squeezed,
     bodies whose joints sub-steps did not close before.
@@ -18,7 +19,7 @@ from rigidimpulse.engine.cheapest import CheapestRegime
 from rigidimpulse.engine.exact.step_begin import begin_counts, make_counts
 from rigidimpulse.engine.pair_events import PairEvents
 from rigidimpulse.engine.pair_table import NEVER, RUNAWAY, USED, most_solves
-from rigidimpulse.engine.regime import ASK, REBOUND, most_solves_of_all, unlike
+from rigidimpulse.engine.regime import ASK, REBOUND, most_solves_of_all, roll, unlike
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.island import Island
 from rigidimpulse.model.world import World
@@ -31,6 +32,8 @@ them: a load that presses a light tilted disc flat needs hundreds."""
 FORCED = 5.0
 """Times in place of one that an island counts to be dealt with on which varying forces act: forces are evaluated outside of kernels."""
 HANDED = "exact contact cost more than it advanced: sub-steps hold these bodies, which may sink in by a skin, 0.8 % of the inner radius"
+ROLLING = "; they have no rolling and no spinning friction there"
+"""What is added where those act."""
 
 
 class HandOver:
@@ -83,12 +86,15 @@ class HandOver:
         return True
 
     def count(self, islands: list[Island]) -> None:
-        """Count that the exact regime deals with these islands."""
+        """Count that the exact regime deals with these islands; not with bodies that fly under varying forces, which touch nothing."""
         for island in islands:
-            self.solve_count[island.members] += 1.0
+            if len(island.place) or len(island.joints):
+                self.solve_count[island.members] += 1.0
 
     def runs_away(self, run: Run, island: Island) -> bool:
-        """Whether a member was dealt with more often than the island is worth."""
+        """Whether a member was dealt with more often than the island is worth; sub-steps have nothing to hold where nothing touches."""
+        if not len(island.place) and not len(island.joints):
+            return False
         weight = FORCED if run.forces.acts[island.members].any() else 1.0
         return bool(np.any(weight * self.solve_count[island.members] > most_solves.py_func(len(island.members))))
 
@@ -113,9 +119,13 @@ class HandOver:
             self.cheapest.handed_over(members, RUNAWAY)
         names = tuple(run.world.names[i] for i in members.tolist())
         if names not in self._handed:
-            run.log.note(island.time, "handed to sub-steps", names, HANDED)
+            run.log.note(island.time, "handed to sub-steps", names, HANDED + ROLLING * self._rolls(island))
         self._handed[names] = self._handed.get(names, 0) + 1
         return True
+
+    def _rolls(self, island: Island) -> bool:
+        """Whether rolling or spinning friction acts between members."""
+        return self._world.rolling.size > 0 and bool(roll(self._world, island.contacts.body_a, island.contacts.body_b).any())
 
     def _is_unlike(self, pair_events: PairEvents, members: np.ndarray) -> bool:
         """Whether members met something in this step that is too unlike them in mass for sub-steps."""
