@@ -24,7 +24,7 @@ from rigidimpulse.io.pieces import DENSITY, GHOST, Piece, fill_mass, joined, wei
 from rigidimpulse.io.usd.frames import Frames
 from rigidimpulse.io.usd.library import Prim, SdfPath, UsdGeom, UsdPhysics
 from rigidimpulse.io.usd.looks import looks_of
-from rigidimpulse.io.usd.materials import Filters, Units, given_mass, positive, read_material
+from rigidimpulse.io.usd.materials import Filters, Units, bound_materials, given_mass, positive, read_material
 from rigidimpulse.io.usd.shapes import Shapes, placed_in
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.keyframes import Keyframes
@@ -55,11 +55,13 @@ class BodyReader:
         self.name_of: dict[SdfPath, str] = {}
         self.triggers: list[Trigger] = []
         self._materials: dict[SdfPath, tuple[Material, float]] = {}
+        self._bound: dict[SdfPath, SdfPath] = {}
         self._rigid = dict(parsed.get("RigidBody", []))
         self.colliders = [entry for kind, entries in parsed.items() if kind.endswith("Shape") for entry in entries]
         # In the order of the file, whatever their kind.
         place = {prim.GetPath(): k for k, prim in enumerate(frames.prims())}
         self.colliders.sort(key=lambda entry: place.get(entry[0], 0))
+        self._bound = bound_materials([self.stage.GetPrimAtPath(path) for path, _ in self.colliders])
         self._names = _Names()
         self._make(place)
 
@@ -147,7 +149,7 @@ class BodyReader:
                 continue
             if any(self.frames.is_animated(above) for above in _between(collider, prim)):
                 self.notes.append(f"collider {path} is animated against its body: it stays as it is at rest")
-            material, density = self._material(desc.materials)
+            material, density = self._material(path, desc.materials)
             given = given_mass(collider, self.units, np.eye(3)) if collider != prim else {}
             pieces.append(Piece(*placed, material, None))
             masses.append(given.get("mass"))
@@ -161,9 +163,9 @@ class BodyReader:
             return None
         return placed_in(made, self.frames.rigid(collider), self.frames.rigid(prim))
 
-    def _material(self, bound: Any) -> tuple[Material, float]:
-        """Return the material of a collider, and its density in kg/m^3, 0 if it says none."""
-        path = next((path for path in bound if path), None)
+    def _material(self, collider: SdfPath, parsed: Any) -> tuple[Material, float]:
+        """Return the material of a collider, and its density in kg/m^3, 0 if it says none; parsed: those that the parser found."""
+        path = self._bound.get(collider) or next((path for path in parsed if path), None)
         if path is None:
             return Material(), 0.0
         if path not in self._materials:

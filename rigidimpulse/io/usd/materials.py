@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rigidimpulse.core.quaternion import to_matrix
-from rigidimpulse.io.usd.library import Prim, SdfPath, Stage, UsdPhysics
+from rigidimpulse.io.usd.library import Prim, SdfPath, Stage, UsdPhysics, UsdShade
 from rigidimpulse.scene.collision_filter import CollisionFilter
 from rigidimpulse.scene.material import Material
 
@@ -33,6 +33,13 @@ def positive(attribute: Any) -> float:
     """Return the value of an attribute, 0 if it is not a number above 0: UsdPhysics means "not given" by that."""
     value = attribute.Get() if attribute else None
     return float(value) if value is not None and np.isfinite(value) and value > 0.0 else 0.0
+
+
+def bound_materials(prims: list[Prim]) -> dict[SdfPath, SdfPath]:
+    """Return the physics material of each prim that has one, by paths: bound to it or to a prim above, by itself or by a collection."""
+    materials = UsdShade.MaterialBindingAPI.ComputeBoundMaterials(prims, "physics")[0]
+    found = {prim.GetPath(): material.GetPrim() for prim, material in zip(prims, materials, strict=True) if material}
+    return {path: material.GetPath() for path, material in found.items() if material.HasAPI(UsdPhysics.MaterialAPI)}
 
 
 def read_material(prim: Prim, notes: list[str]) -> Material:

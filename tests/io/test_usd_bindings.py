@@ -1,0 +1,60 @@
+"""Which physics material a collider of a USD file has: what usd-core itself finds for the purpose "physics"."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import rigidimpulse as ri
+
+pytest.importorskip("pxr")
+from pxr import Usd, UsdPhysics, UsdShade
+from usd_files import File
+
+DENSITIES = {"light": 250.0, "heavy": 2000.0}
+WEAK, STRONG = UsdShade.Tokens.weakerThanDescendants, UsdShade.Tokens.strongerThanDescendants
+
+
+def scene_of(folder: Path, bindings: list[tuple[str, str, Any, str]], collection: str = "") -> tuple[ri.Scene, str]:
+    """A cube "/group/body/shape" under bindings (prim, material, strength, purpose), and the name of the material that usd-core finds for it.
+
+    collection: the material that a collection of the group binds to the cube.
+    """
+    file = File()
+    file.prim("/group")
+    file.body("/group/body")
+    cube = file.collider("/group/body/shape", "Cube", size=1.0)
+    materials = {name: UsdShade.Material.Define(file.stage, f"/{name}") for name in (*DENSITIES, "look")}
+    for name, density in DENSITIES.items():
+        UsdPhysics.MaterialAPI.Apply(materials[name].GetPrim()).CreateDensityAttr(density)
+    for path, name, strength, purpose in bindings:
+        UsdShade.MaterialBindingAPI.Apply(file.stage.GetPrimAtPath(path)).Bind(materials[name], strength, purpose)
+    if collection:
+        chosen = Usd.CollectionAPI.Apply(file.stage.GetPrimAtPath("/group"), "chosen")
+        chosen.IncludePath("/group/body/shape")
+        binding = UsdShade.MaterialBindingAPI.Apply(file.stage.GetPrimAtPath("/group"))
+        binding.Bind(chosen, materials[collection], "chosen", STRONG, "physics")
+    found = UsdShade.MaterialBindingAPI(cube).ComputeBoundMaterial("physics")[0]
+    return file.load(folder), found.GetPrim().GetName()
+
+
+@pytest.mark.parametrize(("bindings", "collection", "wanted"), [
+    ([("/group/body/shape", "light", WEAK, "physics")], "", "light"),
+    ([("/group/body", "light", WEAK, "physics")], "", "light"),
+    ([("/group", "light", WEAK, "physics")], "", "light"),
+    ([("/group", "light", WEAK, "")], "", "light"),
+    ([("/group", "light", WEAK, "physics"), ("/group/body/shape", "heavy", WEAK, "physics")], "", "heavy"),
+    ([("/group", "light", STRONG, "physics"), ("/group/body/shape", "heavy", WEAK, "physics")], "", "light"),
+    ([("/group", "light", WEAK, "physics"), ("/group/body/shape", "look", WEAK, "")], "", "light"),
+    ([("/group/body/shape", "look", WEAK, "")], "", "look"),
+    ([], "heavy", "heavy"),
+    ([("/group/body/shape", "light", WEAK, "physics")], "heavy", "heavy"),
+])  # fmt: skip
+def test_the_material_is_that_of_usd(tmp_path: Path, bindings: list, collection: str, wanted: str) -> None:
+    """Bindings of prims above, and of their collections, were lost: the density was 1,000 kg/m^3."""
+    scene, found = scene_of(tmp_path, bindings, collection)
+    assert found == wanted
+    material = scene["body"].material
+    assert material.density == DENSITIES.get(wanted, 1000.0)
