@@ -18,7 +18,7 @@ WEAK, STRONG = UsdShade.Tokens.weakerThanDescendants, UsdShade.Tokens.strongerTh
 
 
 def scene_of(folder: Path, bindings: list[tuple[str, str, Any, str]], collection: str = "") -> tuple[ri.Scene, str]:
-    """A cube "/group/body/shape" under bindings (prim, material, strength, purpose), and the name of the material that usd-core finds for it.
+    """A cube "/group/body/shape" under bindings (prim, material, strength, purpose), and the name of its material as usd-core finds it.
 
     collection: the material that a collection of the group binds to the cube.
     """

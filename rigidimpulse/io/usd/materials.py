@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from rigidimpulse.core.quaternion import to_matrix
+from rigidimpulse.io.pieces import Weight, moved_unit
 from rigidimpulse.io.usd.library import Prim, SdfPath, Stage, UsdPhysics, UsdShade
 from rigidimpulse.scene.collision_filter import CollisionFilter
 from rigidimpulse.scene.material import Material
@@ -64,14 +65,20 @@ def read_material(prim: Prim, notes: list[str]) -> Material:
     )  # fmt: skip
 
 
-def given_mass(prim: Prim, units: Units, stretch: np.ndarray) -> dict[str, Any]:
+def given_mass(prim: Prim, units: Units, stretch: np.ndarray, notes: list[str]) -> dict[str, Any]:
     """Return what the MassAPI of a prim says: mass, density, center_of_mass (3,), inertia (3, 3), in SI; only what is given.
 
-    stretch: K (3, 3) of the prim, which its centre of mass is under.
+    Args:
+        prim: it. units: of its stage. stretch: K (3, 3) of the prim, which its centre of mass is under.
+        notes: where the line of the report goes, for figures that make no sense.
+
     """
     if not prim.HasAPI(UsdPhysics.MassAPI):
         return {}
     api, values = UsdPhysics.MassAPI(prim), {}
+    for what, attribute in (("mass", api.GetMassAttr()), ("density", api.GetDensityAttr())):
+        if not attribute.Get() >= 0.0 or not np.isfinite(attribute.Get()):
+            notes.append(f"prim {prim.GetPath()}: its {what} is {attribute.Get():g}, which is taken as not given")
     if mass := positive(api.GetMassAttr()):
         values["mass"] = mass * units.mass
     if density := positive(api.GetDensityAttr()):
@@ -85,7 +92,24 @@ def given_mass(prim: Prim, units: Units, stretch: np.ndarray) -> dict[str, Any]:
         turn = np.array([given.GetReal(), *given.GetImaginary()], float)
         axes = to_matrix(turn / np.linalg.norm(turn)) if np.linalg.norm(turn) > 1e-6 else np.eye(3)
         values["inertia"] = axes @ np.diag(moments) @ axes.T * units.mass * units.length**2
+    elif np.any(moments != 0.0):
+        told = ", ".join(f"{moment:g}" for moment in moments)
+        notes.append(f"prim {prim.GetPath()}: its moments of inertia are {told}, which is taken as not given")
     return values
+
+
+def weight_given(part: Weight, given: dict[str, Any], position: np.ndarray, rotation: np.ndarray) -> Weight:
+    """Return the mass properties of a collider with what its own MassAPI says of centre of mass and inertia.
+
+    Args:
+        part: what its shape and mass say, in the frame of its body. given: of `given_mass`.
+        position, rotation: (3,) m and (3, 3), of the collider in the frame of its body.
+
+    """
+    centre = position + rotation @ given["center_of_mass"] if "center_of_mass" in given else part.center_of_mass
+    if "inertia" in given:
+        return Weight(part.mass, centre, rotation @ given["inertia"] @ rotation.T)
+    return Weight(part.mass, centre, part.inertia + part.mass * moved_unit(centre - part.center_of_mass))
 
 
 class Filters:
