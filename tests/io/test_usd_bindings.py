@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import rigidimpulse as ri
+from rigidimpulse.scene.material import combine
 
 pytest.importorskip("pxr")
-from pxr import Usd, UsdPhysics, UsdShade
+from pxr import Sdf, Usd, UsdPhysics, UsdShade
 from usd_files import File
 
 DENSITIES = {"light": 250.0, "heavy": 2000.0}
@@ -58,3 +60,25 @@ def test_the_material_is_that_of_usd(tmp_path: Path, bindings: list, collection:
     assert found == wanted
     material = scene["body"].material
     assert material.density == DENSITIES.get(wanted, 1000.0)
+
+
+@pytest.mark.parametrize("modes", list(product(("average", "min", "multiply", "max"), repeat=2)))
+def test_pairs_that_physx_combines_otherwise_are_told(tmp_path: Path, modes: tuple[str, str]) -> None:
+    """Of two modes PhysX takes the higher of average < min < multiply < max: restitutions 0.5 and 1 are 0.75, 0.5, 0.5, 1.
+
+    Ours has the precedence of glTF, and nothing said so.
+    """
+    file = File()
+    for name, mode, restitution in zip("ab", modes, (0.5, 1.0), strict=True):
+        material = UsdShade.Material.Define(file.stage, f"/m{name}")
+        UsdPhysics.MaterialAPI.Apply(material.GetPrim()).CreateRestitutionAttr(restitution)
+        material.GetPrim().CreateAttribute("physxMaterial:restitutionCombineMode", Sdf.ValueTypeNames.Token).Set(mode)
+        file.body(f"/{name}")
+        prim = file.collider(f"/{name}/shape", "Cube", size=1.0)
+        UsdShade.MaterialBindingAPI.Apply(prim).Bind(material, WEAK, "physics")
+    scene = file.load(tmp_path)
+    in_physx = [0.75, 0.5, 0.5, 1.0][max(["average", "min", "multiply", "max"].index(mode) for mode in modes)]
+    here = combine(scene["a"].material, scene["b"].material)[0]
+    told = f"materials /ma and /mb combine to restitution {here:g}, not {in_physx:g} as in PhysX"
+    assert [line for line in scene.report if line.startswith(told)] == list(scene.report)
+    assert len(scene.report) == (here != in_physx)

@@ -24,7 +24,16 @@ from rigidimpulse.io.pieces import DENSITY, GHOST, Piece, Weight, fill_mass, joi
 from rigidimpulse.io.usd.frames import Frames
 from rigidimpulse.io.usd.library import Prim, SdfPath, UsdGeom, UsdPhysics
 from rigidimpulse.io.usd.looks import looks_of
-from rigidimpulse.io.usd.materials import Filters, Units, bound_materials, given_mass, positive, read_material, weight_given
+from rigidimpulse.io.usd.materials import (
+    Filters,
+    Units,
+    bound_materials,
+    combined_otherwise,
+    given_mass,
+    positive,
+    read_material,
+    weight_given,
+)
 from rigidimpulse.io.usd.shapes import Shapes, placed_in
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.keyframes import Keyframes
@@ -97,6 +106,7 @@ class BodyReader:
                 raise error if "prim " in error.where else error.within(f"prim {path}") from None
         for path, desc in later:
             self._add_trigger(path, desc)
+        self.notes += combined_otherwise({path: material for path, (material, _) in self._materials.items()})
 
     def _below(self, path: SdfPath) -> set[str]:
         """Names of the bodies that a path is, or that are below it, or above it."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -11,10 +13,11 @@ from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.io.pieces import Weight, moved_unit
 from rigidimpulse.io.usd.library import Prim, SdfPath, Stage, UsdPhysics, UsdShade
 from rigidimpulse.scene.collision_filter import CollisionFilter
-from rigidimpulse.scene.material import Material
+from rigidimpulse.scene.material import Material, combine
 
-COMBINE = {"average": "average", "min": "minimum", "max": "maximum", "multiply": "multiply"}
-"""Combine modes of PhysxMaterialAPI."""
+COMBINE = {"average": "average", "min": "minimum", "multiply": "multiply", "max": "maximum"}
+"""Combine modes of PhysxMaterialAPI; of two that differ PhysX takes the later one, `Material` has a precedence of its own."""
+COEFFICIENTS = ("restitution", "static friction", "dynamic friction")
 
 
 class Units:
@@ -63,6 +66,18 @@ def read_material(prim: Prim, notes: list[str]) -> Material:
     return Material(
         restitution=restitution, static_friction=static, dynamic_friction=dynamic, any_restitution=restitution > 1.0, **modes
     )  # fmt: skip
+
+
+def combined_otherwise(materials: Mapping[SdfPath, Material]) -> list[str]:
+    """Return lines about pairs of materials that PhysX combines to other values, for the sake of its precedence of combine modes."""
+    ranks, lines = list(COMBINE.values()), []
+    for (path_a, a), (path_b, b) in combinations(sorted(materials.items(), key=lambda entry: str(entry[0])), 2):
+        modes = {name: max(getattr(a, name), getattr(b, name), key=ranks.index) for name in ("restitution_combine", "friction_combine")}
+        here, there = combine(a, b), combine(replace(a, **modes), replace(b, **modes))
+        told = [f"{what} {mine:g}, not {other:g}" for what, mine, other in zip(COEFFICIENTS, here, there, strict=False) if mine != other]
+        if told:
+            lines.append(f"materials {path_a} and {path_b} combine to {', '.join(told)} as in PhysX: combine modes have another precedence")
+    return lines
 
 
 def given_mass(prim: Prim, units: Units, stretch: np.ndarray, notes: list[str]) -> dict[str, Any]:
