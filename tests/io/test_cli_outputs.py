@@ -65,3 +65,10 @@ def test_the_file_of_the_scene_is_not_written_over(tmp_path: Path, suffix: str) 
     code, output, error = simulated(tmp_path, "-o", source, scene=source)
     assert (code, output) == (2, "") and "the scene comes from" in error
     assert source.read_bytes() == before
+
+
+@pytest.mark.parametrize("scene", ["nofile.py", "nofile.usda", "no_such_scene"])
+def test_a_live_page_of_nothing_is_refused(scene: str) -> None:
+    """Only the address of a page was printed."""
+    result = CliRunner().invoke(main, ["live", scene, "--no-open"])
+    assert (result.exit_code, result.stdout) == (2, "") and scene in result.stderr
