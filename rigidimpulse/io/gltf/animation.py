@@ -1,8 +1,8 @@
 """Animated nodes as keyframes: the rigid frame of a node whose own or whose parents' transforms have channels.
 
 Keys are taken at the times of all channels of the chain of nodes; where more than one node turns, or a channel is not
-linear, also every `BETWEEN` s and where that is not enough, since what is in between is no even motion there. STEP channels move over the last
-`BETWEEN` s before a key: a jump has no velocity to push with.
+linear, also every `BETWEEN` s and where that is not enough, since what is in between is no even motion there. STEP channels
+move over the last `BETWEEN` s before a key: a jump has no velocity to push with.
 """
 
 from __future__ import annotations
