@@ -63,7 +63,7 @@ def test_the_rim_of_a_mug_does_not_sink_into_a_floor(seed: int) -> None:
 def test_cylinders_that_stand_upright_after_any_turn_land_when_they_must(seed: int) -> None:
     """A cylinder whose own axis is turned in its mesh frame, and turned back by the body, falls flat: t = sqrt(2 drop / g), to the margin.
 
-    The axis is a unit vector but for round-off. Where the rest of it across the normal was taken for a direction, 14 of 25 landed up to
+    The axis is a unit vector to round-off. Where the rest of it across the normal was taken for a direction, 14 of 25 landed up to
     12 ms too early, and were thrown up.
     """
     turn = np.random.default_rng(seed).normal(size=4)

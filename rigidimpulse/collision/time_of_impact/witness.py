@@ -40,7 +40,7 @@ _TRUNCATION = 0.2  # kappa_1 of the ITP method times the first bracket; kappa_2 
 def _beside(across, axis):
     """The direction of a vector across an axis; zero where all of it is round-off.
 
-    An axis is a unit vector but for round-off. Along a normal that is parallel to it, the vector is round-off, and lies along the axis: as
+    An axis is a unit vector to round-off. Along a normal that is parallel to it, the vector is round-off, and lies along the axis: as
     a direction it put the point of a cylinder that stood upright a radius beyond its end.
     """
     size = length(across)

@@ -156,7 +156,7 @@ class ForceLog:
     def add(self, members: np.ndarray, end: float, done: np.ndarray) -> None:
         """Members were moved to `end` [s] from where their lines ended; done (k, 7): what each row did on the way.
 
-        No frame is on it, but for round-off at its start.
+        No frame is on it, save by round-off at its start.
         """
         for i in members.tolist():
             rows, first = self._rows[i], int(self._written[i])
