@@ -13,6 +13,7 @@ from rigidimpulse.cli.jobs import (
     BAD_SCENE,
     CHECK_FAILED,
     Head,
+    Outputs,
     end_if_partial,
     given_options,
     print_table,
@@ -27,7 +28,7 @@ from rigidimpulse.cli.site import gallery as gallery_pages
 from rigidimpulse.cli.studies import compare, hardcases, study
 from rigidimpulse.cli.warmup import warmup
 from rigidimpulse.cli.wedge import wedge
-from rigidimpulse.recording.exporters import export_suffixes, reader_suffixes
+from rigidimpulse.recording.exporters import ExportOptions, export_suffixes, reader_suffixes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -120,18 +121,20 @@ def demo(name: str | None, output: tuple[str, ...], view: bool, profile: bool, *
             for entry_name in known:
                 click.echo(f"  {entry_name.ljust(width)}  {gallery.load(entry_name).description}")
         return
-    entry, keys, storage = gallery.load(name), _export_settings(settings), storage_of(settings)
+    entry, outputs, storage = gallery.load(name), _outputs(output, settings), storage_of(settings)
     job = job_of(entry)._replace(**given_options(settings))
     click.echo(f"{entry.name}: {entry.description}")
-    run = run_job(job, output, profile, storage)
+    run = run_job(job, outputs, profile, storage)
     is_whole = job.duration == entry.duration and not run.status.is_partial
     checks = entry.check(run) if is_whole else []
     if is_whole:
         _print_checks(checks)
     else:
         click.echo(f"checks left out: they are for the scene's own duration, {entry.duration:g} s")
-    _hand_over(run, output, view, keys, Head(entry.description, tuple(checks)))
+    is_written = _hand_over(run, outputs, view, Head(entry.description, tuple(checks)))
     end_if_partial(run)
+    if not is_written:
+        sys.exit(BAD_SCENE)
     if not all(check.passed for check in checks):
         sys.exit(CHECK_FAILED)
 
@@ -145,12 +148,14 @@ def simulate(scene: str, output: tuple[str, ...], view: bool, profile: bool, **s
     """Simulate SCENE and write the recording."""
     from rigidimpulse.studies.job import find_job
 
-    keys, storage = _export_settings(settings), storage_of(settings)
+    outputs, storage = _outputs(output, settings), storage_of(settings)
     job = find_job(scene)._replace(**given_options(settings))
     head = None if job.entry is None else Head(job.entry.description)
-    run = run_job(job, output, profile, storage)
-    _hand_over(run, output, view, keys, head)
+    run = run_job(job, outputs, profile, storage)
+    is_written = _hand_over(run, outputs, view, head)
     end_if_partial(run)
+    if not is_written:
+        sys.exit(BAD_SCENE)
 
 
 @main.command()
@@ -189,7 +194,7 @@ def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
     plan = make_plan(world)
     told = forecast(world, plan, job.duration).text(job.duration)
     if duration is not None:
-        run = run_job(job, ())
+        run = run_job(job)
         end_if_partial(run)
         assert run.plan is not None and run.profile is not None
         remember(world, plan, job.duration, run.profile.seconds - run.profile.preparing)
@@ -198,9 +203,11 @@ def explain(scene: str, duration: float | None, accuracy: str | None) -> None:
     click.echo(plan.explain())
 
 
-def _export_settings(settings: dict[str, Any]) -> dict[str, Any]:
-    """Take out and return the options of `export_options`."""
-    return {name: settings.pop(name) for name in ("start_frame", "tolerance", "impact_keys", "samples", "up_axis", "unit", "pre_roll")}
+def _outputs(names: Sequence[str], settings: dict[str, Any]) -> Outputs:
+    """Return what is to be written; the options of `export_options` are taken out of the settings."""
+    pre_roll = settings.pop("pre_roll")
+    given = {name: settings.pop(name) for name in ("start_frame", "tolerance", "impact_keys", "samples", "up_axis", "unit")}
+    return Outputs(names, ExportOptions(**given), pre_roll)
 
 
 def _print_checks(checks: Sequence[Check]) -> None:
@@ -211,21 +218,28 @@ def _print_checks(checks: Sequence[Check]) -> None:
     print_table([("", "check", "value", "bound", "law"), *rows], right=(2, 3))
 
 
-def _hand_over(run: Recording, output: Sequence[str], view: bool, keys: dict[str, Any], head: Head | None) -> None:
-    """Write the recording where it was asked for, and open it; keys: options of animated nodes, and the pre-roll; head: of its page."""
+def _hand_over(run: Recording, outputs: Outputs, view: bool, head: Head | None) -> bool:
+    """Write the recording where it was asked for, and open it; return whether every file was written. head: of its page."""
+    from rigidimpulse.core.errors import SceneError
     from rigidimpulse.core.files import write_renamed
     from rigidimpulse.view.page import write_html
 
-    run = run.part(keys.pop("pre_roll"))
-    takes_options = export_suffixes(with_options=True)
-    for target in map(Path, output):
-        if target.suffix == ".html" and head is not None:
-            path = write_renamed(target, lambda part: write_html(run, part, head.title, head.checks))
+    run, is_written = run.part(outputs.pre_roll), True
+    for name in outputs.names:
+        target = Path(name)
+        try:
+            if target.suffix == ".html" and head is not None:
+                path = write_renamed(target, lambda part: write_html(run, part, head.title, head.checks))
+            else:
+                path = run.export(target, **outputs.options_of(name)._asdict())
+        except SceneError as error:  # the run is not lost for the other files
+            Failure(str(error)).show()
+            is_written = False
         else:
-            path = run.export(target, **(keys if target.suffix in takes_options else {}))
-        click.echo(f"wrote {path} ({size_of(path)})")
+            click.echo(f"wrote {path} ({size_of(path)})")
     if view:
         show(run, head)
+    return is_written
 
 
 for command in (hardcases, study, compare, wedge, live, gallery_pages, warmup):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import click
 
 from rigidimpulse.recording.cache import Cache
-from rigidimpulse.recording.exporters import export_suffixes
+from rigidimpulse.recording.exporters import ExportOptions, check_export, export_suffixes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from rigidimpulse.recording.recording import Recording
     from rigidimpulse.scene.accuracy import Accuracy, Preset
     from rigidimpulse.scene.accuracy_targets import AccuracyTarget
+    from rigidimpulse.scene.scene import Scene
     from rigidimpulse.studies.compare import Comparison
     from rigidimpulse.studies.job import Job
 
@@ -67,15 +69,50 @@ def storage_of(settings: dict[str, Any]) -> Storage:
     return Storage(None if path is None else Cache(path, trust=trust), settings.pop("from_frame"))
 
 
-def run_job(job: Job, output: Sequence[str], profile: bool = False, storage: Storage = NOT_KEPT) -> Recording:
-    """Simulate with a progress bar, kept in a cache if one is named, and print the summary; outputs are looked at first."""
-    from rigidimpulse.core.errors import SceneError
-    from rigidimpulse.core.files import check_target
+class Outputs(NamedTuple):
+    """Files that a run is written to.
 
-    for target in output:
-        if Path(target).suffix not in export_suffixes():
-            raise SceneError(f"cannot write {target!r}", f"use a name that ends in {', '.join(export_suffixes())}")
-        check_target(Path(target))
+    Attributes:
+        names: of the files. options: of animated files. pre_roll: frames at the beginning that are not written.
+
+    """
+
+    names: Sequence[str] = ()
+    options: ExportOptions = ExportOptions()
+    pre_roll: int = 0
+
+    def options_of(self, name: str) -> ExportOptions:
+        """Return the options that a file has."""
+        return self.options if Path(name).suffix in export_suffixes(with_options=True) else ExportOptions()
+
+    def check(self, job: Job, scene: Scene | None = None) -> None:
+        """Look at all that is asked for, as far as it is known before the run; scene: None before it is made.
+
+        Raises:
+            SceneError: something of it cannot be written.
+
+        """
+        from rigidimpulse.core.errors import SceneError
+        from rigidimpulse.core.files import check_target
+        from rigidimpulse.io.motion import check_options
+
+        check_options(self.options)
+        for name in self.names:
+            if Path(name).suffix not in export_suffixes():
+                raise SceneError(f"cannot write {name!r}", f"use a name that ends in {', '.join(export_suffixes())}")
+            check_target(Path(name))
+            check_export(Path(name), self.options_of(name), scene)
+        length = job.duration * job.fps
+        if self.pre_roll and math.isfinite(length) and self.pre_roll > round(length):
+            raise SceneError(f"a pre-roll of {self.pre_roll} frames in a run of {round(length) + 1}", "leave out fewer, or run longer")
+
+
+NO_FILE = Outputs()
+
+
+def run_job(job: Job, outputs: Outputs = NO_FILE, profile: bool = False, storage: Storage = NOT_KEPT) -> Recording:
+    """Simulate with a progress bar, kept in a cache if one is named, and print the summary; outputs are looked at first."""
+    outputs.check(job)
     from time import perf_counter
 
     from tqdm import tqdm
@@ -83,6 +120,7 @@ def run_job(job: Job, output: Sequence[str], profile: bool = False, storage: Sto
     from rigidimpulse.engine.simulate import simulate as run_scene
 
     scene = job.make()
+    outputs.check(job, scene)
     cache, from_frame = storage
     begun = cache is not None and from_frame is None and Path(cache.path).exists()
     start = perf_counter()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import click
@@ -21,6 +22,13 @@ def live(scene: str, open_browser: bool, **settings: Any) -> None:
     Sliders on the page change the scene, a body that is dragged there is thrown, and a file that is saved runs again. The arguments of
     scene() in a file.py are sliders: def scene(height: float = 2.0).
     """
+    from rigidimpulse.core.errors import SceneError
+    from rigidimpulse.studies.job import find_job
     from rigidimpulse.studies.live.session import live as show_live
 
+    # What is wrong inside a file is shown on the page, and may be corrected while it is up.
+    if not Path(scene).suffix:
+        find_job(scene)
+    elif not Path(scene).is_file():
+        raise SceneError("there is no such file", "check the path", f"scene file {scene!r}")
     show_live(scene, open_browser=open_browser, **given_options(settings)).wait()

@@ -165,7 +165,7 @@ def compare(first: str, second: str, scene: str, output: str | None, view: bool,
     job = job._replace(**given_options(settings))
     for word in dict.fromkeys(words):
         if word not in recorded:
-            recorded[word] = run_job(job._replace(accuracy=word), ())
+            recorded[word] = run_job(job._replace(accuracy=word))
             end_if_partial(recorded[word])
     runs = [recorded[word] for word in words]
     result = comparison.compare(runs[0], runs[1], comparison.labels_of(words), comparison.common_horizon(runs))

@@ -102,7 +102,7 @@ class NoForces:
     def carry_on(self, _earlier: Any) -> None:
         """Nothing is to be left out."""
 
-    let_act = present = may_rest = fly = load = push = _ask_nobody
+    let_act = present = may_rest = fly = of_flight = load = push = _ask_nobody
 
 
 class NoSoftBodies:

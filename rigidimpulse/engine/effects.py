@@ -172,7 +172,7 @@ class VaryingLoad:
         """Included where a force varies."""
         if not world.force_tables:
             return Skip("no force varies")
-        return Bound("where contacts or joints hold bodies it is constant over a sub-step", {"loads": keep_steady_load})
+        return Bound("where contacts hold bodies it is constant over a sub-step", {"loads": keep_steady_load})
 
 
 @dataclass(frozen=True)

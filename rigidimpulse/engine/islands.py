@@ -180,14 +180,21 @@ def classify(run: Run, island: Island) -> None:
     island.live |= np.abs(island.approach) <= island.rest_speed
 
 
-def is_alone(run: Run, members: np.ndarray, rest: float) -> bool:
-    """Whether nothing can come near members in `rest` s, that may touch them, however they and all else may turn aside."""
+def is_alone(run: Run, members: np.ndarray, rest: float, push: float = 0.0) -> bool:
+    """Whether nothing can come near members in `rest` s, that may touch them, however they and all else may turn aside.
+
+    push: m/s2, at most, by forces that vary on the members.
+    """
     world, trajectory = run.world, run.state.trajectory
     if not world.can_collide:
         return True
     speed = np.sqrt((trajectory.velocity**2).sum(1))
     speed[members] = np.sqrt((run.state.now.velocity[members] ** 2).sum(1))
-    reach = np.where(world.dynamic, rest * (FASTER * speed + rest * np.sqrt((world.steady_acceleration**2).sum(1))), 0.0)[:, None]
+    pull = np.sqrt((world.steady_acceleration**2).sum(1))
+    pushed = np.flatnonzero(run.forces.acts)
+    pull[pushed] = np.maximum(pull[pushed], np.sqrt((trajectory.acceleration[pushed] ** 2).sum(1)))
+    pull[members] += push
+    reach = np.where(world.dynamic, rest * (FASTER * speed + rest * pull), 0.0)[:, None]
     low, high = run.box_min - reach, run.box_max + reach
     for i in members.tolist():
         far, at = reach[i] + world.bound_radius[i] + world.largest_contact_margin, run.state.now.position[i]

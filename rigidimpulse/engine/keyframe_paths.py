@@ -1,7 +1,8 @@
 """Paths of kinematic bodies with keyframes: constant velocity and spin between keys, held after the last; and bodies that are let go.
 
-The velocity is that of the body's origin. Where that is not the centre of mass and the body turns, the centre goes along an arc. It is
-followed along chords, each of which turns by PIECE at most: they leave the arc by PIECE^2 / 8 of its radius.
+The velocity is that of the body's origin. Where that is not the centre of mass and the body turns, the centre goes along an arc of a radius
+R. It is followed along cubics that have the place and the velocity of the arc at both ends, so that no velocity jumps. A cubic that turns
+by an angle b leaves the arc by R b^4 / 384: b is so small that this is the part CUBIC of the bounding radius at most.
 
 A body with a `release_time` T is compiled as a dynamic one, with its mass, and made immovable when the run begins. At T, between two
 steps, it gets its mass back and goes on freely with the pose, velocity and spin of its path just before T. In the ledger it counts from
@@ -10,20 +11,38 @@ then on.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rigidimpulse.core.portable import length
 from rigidimpulse.core.quaternion import conjugate, multiply, quaternion_from_rotation_vector, rotate, rotation_vector
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.energy import mechanical_energy
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.world import World
 from rigidimpulse.motion.trajectory import FREE, PRESCRIBED, begin, state_at
 from rigidimpulse.scene.keyframes import Keyframes
 
-PIECE = 0.02
-"""rad."""
+CUBIC: float = 1e-8
+"""Part of the bounding radius by which a cubic may leave the arc."""
+MOST_TURN: float = 1.5
+"""rad, of a piece."""
+TINY: float = 1e-100
+"""Stands for 0 where something is divided by it."""
 CENTRED: float = 1e-9
 """Part of the bounding radius up to which a centre of mass is at the origin: that of a mesh is there up to round-off."""
+
+
+class Segment(NamedTuple):
+    """A piece of a path of a centre of mass: what a trajectory starts from."""
+
+    position: np.ndarray  # (3,) m
+    orientation: np.ndarray  # (4,) of the principal frame
+    velocity: np.ndarray  # (3,) m/s
+    angular_velocity: np.ndarray  # (3,) rad/s
+    acceleration: np.ndarray  # (3,) m/s2
+    jerk: np.ndarray  # (3,) m/s3
 
 
 class KeyframePaths:
@@ -34,7 +53,7 @@ class KeyframePaths:
 
     def __init__(self, world: World) -> None:
         """Segments of a compiled scene; bodies that are let go later are immovable from here on."""
-        self.segments: list[tuple[float, int, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None]] = []
+        self.segments: list[tuple[float, int, Segment | None]] = []
         for i, body in enumerate(world.scene.bodies):
             release = np.inf if body.release_time is None else float(body.release_time)
             if body.keyframes is not None:
@@ -48,17 +67,24 @@ class KeyframePaths:
 
     def _add(self, world: World, i: int, keys: Keyframes, release: float) -> None:
         times, positions, turned = keys.arrays(world.scene.bodies[i].orientation)
-        if length(world.offset[i]) > CENTRED * world.bound_radius[i]:
-            times, positions, turned = _in_pieces(times, positions, turned)
-        centre = positions + rotate(turned, world.offset[i])
-        principal = multiply(turned, world.turn[i])
+        off_centre = float(length(world.offset[i])) > CENTRED * world.bound_radius[i]
+        if off_centre:
+            times, positions, turned = _in_pieces((times, positions, turned), world.offset[i], float(world.bound_radius[i]))
+        arm = rotate(turned, world.offset[i])
+        centre, principal = positions + arm, multiply(turned, world.turn[i])
+        none = np.zeros(3)
         for k in np.flatnonzero(times < release).tolist():
-            v = w = np.zeros(3)
+            v = w = acceleration = jerk = none
             if k + 1 < len(times):
                 h = times[k + 1] - times[k]
-                v = (centre[k + 1] - centre[k]) / h
+                v = mean = (centre[k + 1] - centre[k]) / h
                 w = rotation_vector(multiply(principal[k + 1], conjugate(principal[k]))) / h
-            self.segments.append((float(times[k]), i, (centre[k], principal[k], v, w)))
+                if off_centre and np.any(w):
+                    straight = (positions[k + 1] - positions[k]) / h
+                    v, last = straight + cross_arrays(w, arm[k]), straight + cross_arrays(w, arm[k + 1])
+                    acceleration = (6.0 * mean - 4.0 * v - 2.0 * last) / h
+                    jerk = (6.0 * (v + last) - 12.0 * mean) / h**2
+            self.segments.append((float(times[k]), i, Segment(centre[k], principal[k], v, w, acceleration, jerk)))
             if times[k] <= 0.0:
                 # Frame 0 has the velocity with which the body sets out.
                 world.velocity[i], world.angular_velocity[i] = v, w
@@ -72,23 +98,31 @@ class KeyframePaths:
         """Put bodies whose key is at or before `time` on their new trajectory, and let go those whose time it is."""
         trajectory = run.state.trajectory
         while self._next < len(self.segments) and self.segments[self._next][0] <= time:
-            start, i, pose = self.segments[self._next]
+            start, i, segment = self.segments[self._next]
             self._next += 1
             run.recorder.flush(trajectory, i, start, np.zeros(6))
-            if pose is None:
+            if segment is None:
                 _let_go(run, i, start)
             else:
-                x, q, v, w = pose
                 trajectory.start[i], trajectory.mode[i] = start, PRESCRIBED
-                trajectory.position[i], trajectory.orientation[i] = x, q
-                trajectory.velocity[i], trajectory.angular_velocity[i] = v, w
+                trajectory.position[i], trajectory.orientation[i] = segment.position, segment.orientation
+                trajectory.velocity[i], trajectory.angular_velocity[i] = segment.velocity, segment.angular_velocity
+                trajectory.acceleration[i], trajectory.jerk[i] = segment.acceleration, segment.jerk
                 begin(trajectory, i)
 
 
-def _in_pieces(times: np.ndarray, positions: np.ndarray, turned: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Keys (k,), (k, 3), (k, 4) of an origin with others between them, so that no two are turned by more than PIECE."""
+Keys = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Times (k,), positions (k, 3) and orientations (k, 4) of an origin."""
+
+
+def _in_pieces(keys: Keys, offset: np.ndarray, size: float) -> Keys:
+    """Keys with others between them, close enough for a centre of mass at an offset (3,) m; size: m, the bounding radius."""
+    times, positions, turned = keys
     turn = rotation_vector(multiply(turned[1:], conjugate(turned[:-1])))
-    number = np.maximum(np.ceil(length(turn) / PIECE).astype(np.int64), 1)
+    angle = length(turn)
+    radius = length(cross_arrays(turn, rotate(turned[:-1], offset))) / np.maximum(angle, TINY)
+    most = np.sqrt(np.sqrt(384.0 * CUBIC / np.maximum(radius / size, TINY)))
+    number = np.maximum(np.ceil(angle / np.minimum(most, MOST_TURN)).astype(np.int64), 1)
     key = np.repeat(np.arange(len(number)), number)
     share = ((np.arange(len(key)) - (np.cumsum(number) - number)[key]) / number[key])[:, None]
     last = [len(times) - 1]
@@ -111,6 +145,7 @@ def _let_go(run: Run, i: int, time: float) -> None:
     trajectory.position[i], trajectory.orientation[i] = now.position[i], now.orientation[i]
     trajectory.velocity[i], trajectory.angular_velocity[i] = now.velocity[i], now.angular_velocity[i]
     trajectory.acceleration[i], trajectory.start[i], trajectory.mode[i] = world.steady_acceleration[i], time, FREE
+    trajectory.jerk[i] = 0.0
     begin(trajectory, i)
     run.substepped.let_go(np.array([i]))
     run.log.account(time, "let go", mechanical_energy(now, world.constants, np.array([i])))

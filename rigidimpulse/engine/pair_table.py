@@ -21,7 +21,7 @@ from rigidimpulse.core.memory import rows_of
 from rigidimpulse.core.sorted_values import is_among
 from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.model.world import BodyConstants, World
-from rigidimpulse.motion.trajectory import FIXED, FREE, JERK, place_at, rate_of, row_at, turning_points
+from rigidimpulse.motion.trajectory import FIXED, JERK, place_at, rate_of, row_at, turning_points
 
 NEAR = TOLERANCES.events.near
 ROUND_OFF = TOLERANCES.events.contact_margin_round_off
@@ -117,7 +117,7 @@ def path_box(trajectory, i, begin, end, radius, box_min, box_max):
     growth = rate_of(trajectory, i, JERK)
     pull = row_at(trajectory.acceleration, i, growth, s)
     for k in range(3):
-        a, jerk = pull[k] if mode >= FREE else 0.0, 0.0 if mode == FIXED else growth[k]
+        a, jerk = pull[k] if mode != FIXED else 0.0, 0.0 if mode == FIXED else growth[k]
         v = 0.0 if mode == FIXED else trajectory.velocity[i, k] + (a - 0.5 * jerk * s) * s
         last = x[k] + v * h + 0.5 * a * h * h + jerk * h * h * h / 6.0
         low, high = min(x[k], last), max(x[k], last)

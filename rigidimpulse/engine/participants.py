@@ -224,6 +224,10 @@ class RunForces(Protocol):
         """Forces on an island that contacts or joints hold, over h s at most; returns for how long."""
         ...
 
+    def of_flight(self, run: Any, island: Island, /) -> Any:
+        """`FlightForces` of an island that joints hold and nothing touches; None where they do not let it fly."""
+        ...
+
     def push(self, run: Any, members: np.ndarray, span: tuple[float, float], mean: np.ndarray, /) -> float:
         """Forces on sub-stepped members over a span [s] at most, into `value`; returns until when."""
         ...

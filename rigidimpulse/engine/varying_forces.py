@@ -6,7 +6,8 @@ that are held, or stepped by sub-steps, the force is constant over a piece of le
     F = F(t + h/2, x(h/2), v(h/2)),    x, v: after h/2 under the last accelerations of the body, contacts included
 
 This is of second order in h, as contact forces are, and a body at rest stays at rest. The piece is so short that the error of the path,
-|F(h/2) - F| h^2 / (6 m)  with F at both ends, is within the tolerance.
+|F(h/2) - F| h^2 / (6 m)  with F at both ends, is within the tolerance. Jointed bodies that touch nothing ask for forces at the stages of
+their flights (`flight_forces.py`).
 
 Some forces act in a part of space only (`ForceTable.switches`). A step then uses the forces that act at its start. It ends where the set of
 acting forces changes; that time is found by bisection along the trajectory, to round-off. So the steps keep their order. Steps of fixed
@@ -27,9 +28,11 @@ import numpy as np
 
 from rigidimpulse.core.quaternion import to_matrix
 from rigidimpulse.core.tolerances import TOLERANCES
+from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.forces.force import ForceTable, Instant
 from rigidimpulse.dynamics.forces.force_log import ForceLog, ForceWork
 from rigidimpulse.dynamics.forces.mass_flow import BurningForces, MassFlow
+from rigidimpulse.engine.flight_forces import FlightForces
 from rigidimpulse.engine.run import Run
 from rigidimpulse.model.island import Island
 from rigidimpulse.model.state import State
@@ -159,11 +162,11 @@ class VaryingForces:
 
             rows, sums = nystroem(evaluate, self._workspace, first, todo, h, now, self._world.steady_acceleration)
             # A force that gives way within the step: the step ends there.
-            share = 1.0 if cut else self._share_until_break(rows)
+            share = 1.0 if cut else self.share_until_break(rows)
             if share < 1.0:
                 cut, h[todo] = True, np.maximum(share * h[todo], shortest)
                 continue
-            error = self._errors(now, todo, sums.off, h[todo], 1.0 / 12.0) / self._in_flight
+            error = self.errors(now, todo, sums.off, h[todo], 1.0 / 12.0) / self._in_flight
             error = self._together(todo, error, np.maximum)
             # The error inside the step is of order 4, and chooses h.
             grow = np.clip(SAFETY * np.maximum(error, 1e-30) ** -0.25, LEAST_CHANGE, MOST_CHANGE)
@@ -252,6 +255,41 @@ class VaryingForces:
         run.angular_acceleration[members] = island.free[1][self.acts[island.members]] + turned
         return h
 
+    def of_flight(self, run: Run, island: Island) -> FlightForces | None:
+        """Forces on an island that joints hold and nothing touches, over a flight; None where they do not let it fly.
+
+        Steps of fixed length, masses that change and forces that begin and end where bodies are do not.
+        """
+        members, accuracy = island.members[self.acts[island.members]], self._world.accuracy
+        acting = [table for table in self._switching if np.isin(table.body, members).any()]
+        if accuracy.integrator != "exact" or self.flow is not None or acting:
+            return None
+        longest = min(self._next_break(island.time) - island.time, float(self._longest[members].min()))
+        if longest <= 0.0:
+            return None
+        _, total = self._start(run, island.time, np.full(len(self.acts), longest), members)
+        push = run.state.now.inv_mass[members] * np.sqrt((total[members, :3] ** 2).sum(1))
+        return FlightForces(self, run, island, (longest, float(push.max())))
+
+    def evaluate_within(
+        self, time: float, h: float, share: float, members: np.ndarray, bodies: BodyState, rotation: np.ndarray
+    ) -> Stage:
+        """Forces of all rows (k, 6) and their sums (n, 6) on members after a share of a step of h s from `time` on, inside of it."""
+        at = time + h * min(max(share, ASIDE), 1.0 - ASIDE)
+        return self._evaluate(np.full(len(self.acts), at), members, bodies, rotation)
+
+    def powers(self, rows: np.ndarray, bodies: BodyState) -> np.ndarray:
+        """What forces of all rows (k, 6) do a second to bodies where they are: (k, 7) impulse, angular impulse, work."""
+        x, v, w = bodies.position[self._body], bodies.velocity[self._body], bodies.angular_velocity[self._body]
+        force, torque = rows[:, :3], rows[:, 3:]
+        work = np.einsum("ij,ij->i", force, v) + np.einsum("ij,ij->i", torque, w)
+        return np.column_stack([force, torque + cross_arrays(x, force), work])
+
+    def keep_flight(self, members: np.ndarray, time: float, lines: tuple[Lines, Lines], h: float, now: BodyState) -> None:
+        """From `time` on these lines, of rows and their sums, act on members that joints hold, for h s."""
+        self._keep(members, time, lines, np.full(len(self.acts), h), now)
+        self._held_until[members] = time + h
+
     def push(self, run: Run, members: np.ndarray, span: tuple[float, float], mean: np.ndarray) -> float:
         """Forces on sub-stepped members (k,) over a span [s] at most, into `value`; returns until when.
 
@@ -292,7 +330,7 @@ class VaryingForces:
             self._workspace.fly(members, 2.0 * half, now, world.steady_acceleration, last)
             _, end = self._evaluate(time + 2.0 * (1.0 - ASIDE) * half, members, self._workspace.bodies, self._workspace.rotation)
             # On both sides of the middle: a path that turns comes back to its force.
-            sides = [self._errors(now, members, total - f, 2.0 * half[members], 1.0 / 6.0).max() for f in (start, end)]
+            sides = [self.errors(now, members, total - f, 2.0 * half[members], 1.0 / 6.0).max() for f in (start, end)]
             error = max(sides) / (allowed * h / step)
             grow = min(max(SAFETY * max(error, 1e-30) ** -0.5, LEAST_CHANGE), MOST_CHANGE)
             if error <= 1.0 or h <= SHORTEST * step:
@@ -324,7 +362,7 @@ class VaryingForces:
                 gone = True
         return self._evaluate(time + ASIDE * h, members, state.now, state.rotation) if gone else forces
 
-    def _share_until_break(self, rows: Lines) -> float:
+    def share_until_break(self, rows: Lines) -> float:
         """Share of a step after which a force gives way, 1 if none does."""
         parts = zip(self._tables, self._first[:-1], self._first[1:], strict=True)
         return min(table.share_until_break(rows.value[i:j], rows.change[i:j]) for table, i, j in parts)
@@ -357,7 +395,7 @@ class VaryingForces:
         held = self._carried[~self._world.dynamic[self._carried]] if len(self._carried) else self._carried
         return held[np.isin(self._component[held], self._component[members])] if len(held) else held
 
-    def _errors(self, bodies: BodyState, members: np.ndarray, off: np.ndarray, h: np.ndarray, part: float) -> np.ndarray:
+    def errors(self, bodies: BodyState, members: np.ndarray, off: np.ndarray, h: np.ndarray, part: float) -> np.ndarray:
         """Errors (m,) of the members' poses by wrenches that are off by (n, 6) over h (m,) s, relative to the size."""
         square = part * h**2
         moved = square * bodies.inv_mass[members] * np.linalg.norm(off[members, :3], axis=1) / self._size[members]

@@ -34,7 +34,7 @@ LOOP = "order of events"
 CONTACTS, EVENTS, SUBSTEPPED, JOINTS = "contacts", "impacts of balls", "sub-stepped islands", "joints"
 POLYHEDRA, SHARED = "convex polyhedra in sub-stepped islands", "sub-stepped islands on several cores"
 STEPPED_JOINTS, ANY_SHAPES = "joints in sub-stepped islands", "any shapes in sub-stepped islands"
-UNDER_FORCES = "contacts under varying forces"
+UNDER_FORCES, JOINED_UNDER_FORCES = "contacts under varying forces", "joints under varying forces"
 LAST = {
     CONTACTS: ("engine.touching", "find_touching"),
     EVENTS: ("engine.spheres.flight", "fly"),
@@ -45,6 +45,7 @@ LAST = {
     ANY_SHAPES: ("engine.substepped.stages", "go_on"),
     SHARED: ("engine.substepped.stages", "work_on"),
     UNDER_FORCES: ("dynamics.constraints.contact", "hold_contacts"),
+    JOINED_UNDER_FORCES: ("dynamics.constraints.joint_flight", "take_stage"),
 }
 """The kernel of each kind that is compiled last."""
 _BACKGROUND: list[subprocess.Popen] = []
@@ -52,7 +53,7 @@ _BACKGROUND: list[subprocess.Popen] = []
 PARTS_MODULE = "rigidimpulse.engine.warm_up_parts"
 SECONDS = {
     CONTACTS: 60, EVENTS: 20, SUBSTEPPED: 15, POLYHEDRA: 30, SHARED: 25, JOINTS: 40, STEPPED_JOINTS: 40, ANY_SHAPES: 50,
-    UNDER_FORCES: 15, LOOP: 70,
+    UNDER_FORCES: 15, JOINED_UNDER_FORCES: 15, LOOP: 70,
 }  # fmt: skip
 """s that compiling each kind takes, about, on two threads of one core."""
 LONGEST_WAIT, LOOK_AGAIN = 10.0, 0.2
@@ -135,6 +136,7 @@ def kernels_to_compile(
         POLYHEDRA: with_substepped and not general and (world.can_collide or joints), ANY_SHAPES: general,
         SHARED: with_substepped and world.num_bodies > MANY_BODIES and number_of_cores() > 1,
         STEPPED_JOINTS: with_substepped and joints, UNDER_FORCES: world.can_collide and bool(world.force_tables),
+        JOINED_UNDER_FORCES: joints and bool(world.force_tables),
     }  # fmt: skip
     return [kind for kind in LAST if needed[kind] and not is_ready(_last_kernel(kind))]
 

@@ -19,6 +19,7 @@ from rigidimpulse.engine.warm_up import (
     ANY_SHAPES,
     CONTACTS,
     EVENTS,
+    JOINED_UNDER_FORCES,
     JOINTS,
     LOOP,
     POLYHEDRA,
@@ -33,7 +34,11 @@ from rigidimpulse.engine.warm_up import (
 
 LOOK = 0.1
 """s between two looks at the processes."""
-ALL_PARTS = tuple(parts_of((CONTACTS, LOOP, ANY_SHAPES, STEPPED_JOINTS, POLYHEDRA, SHARED, SUBSTEPPED, JOINTS, EVENTS, UNDER_FORCES)))
+ALL_PARTS = tuple(
+    parts_of(
+        (CONTACTS, LOOP, ANY_SHAPES, STEPPED_JOINTS, POLYHEDRA, SHARED, SUBSTEPPED, JOINTS, EVENTS, UNDER_FORCES, JOINED_UNDER_FORCES)
+    )
+)
 """All there are; those that take long come first, so that at the end no process works alone for long."""
 
 

@@ -22,7 +22,7 @@ from rigidimpulse.collision.time_of_impact.result import PairsToSweep
 from rigidimpulse.core.union_find import roots
 from rigidimpulse.dynamics.constraints.contact import ContactProblem
 from rigidimpulse.dynamics.constraints.contact_motion import contact_motion
-from rigidimpulse.dynamics.constraints.joint_flight import fly
+from rigidimpulse.dynamics.constraints.joint_flight import BEGIN, fly, make_stages, next_length, take_stage
 from rigidimpulse.dynamics.constraints.joint_impact import fill_rates, impact_rows
 from rigidimpulse.dynamics.constraints.joint_limits import next_switch
 from rigidimpulse.dynamics.constraints.joint_sub_step import close_at_end, fill_closing_rows, start_joint_rows, stop_rows
@@ -68,6 +68,7 @@ from rigidimpulse.engine.warm_up import (
     ANY_SHAPES,
     CONTACTS,
     EVENTS,
+    JOINED_UNDER_FORCES,
     JOINTS,
     LONGEST_WAIT,
     LOOK_AGAIN,
@@ -107,7 +108,7 @@ def _on_floor(kind: str) -> Run:
     scene = Scene(bodies=[Body("floor", Shape.half_space(), motion="static")])
     shape = Shape.capsule(0.5, 1.0) if kind == ANY_SHAPES else Shape.box((1, 1, 1))
     scene.add(Body("body", shape, position=(0, 0, 0.5), velocity=(0, 0, -1)))
-    if kind in (JOINTS, STEPPED_JOINTS):
+    if kind in (JOINTS, STEPPED_JOINTS, JOINED_UNDER_FORCES):
         scene.add(HingeJoint("body", None, (0, 0, 1), (1, 0, 0)))
     return _run_of(scene)
 
@@ -326,6 +327,15 @@ def _fly_on_joints(run: Run) -> None:
     next_switch(joints.table, island.which, joints.memory, (STEP, STEP), 1.0)
 
 
+def _fly_under_forces(run: Run) -> None:
+    """Flights of bodies that joints hold, under forces that vary."""
+    island, joints = _jointed_box(run), run.joints
+    assert isinstance(joints, JointState)
+    stages = make_stages.py_func(1, make_rows.py_func(int(count_joint_rows.py_func(island.joints, island.which))))
+    take_stage(island, joints.flights.flight, stages, run.world.steady_acceleration, STEP, BEGIN)
+    next_length(STEP, STEP, 1.0)
+
+
 def _touch_with_joints(run: Run) -> None:
     """Contacts of bodies with joints, and what the steps of such bodies call besides: by then others have compiled their parts."""
     problem, turning = _held(run, _contact())
@@ -386,6 +396,7 @@ PARTS = {
     STEPPED_JOINTS: (_step_jointed,),
     ANY_SHAPES: (_step_any_shapes,),
     UNDER_FORCES: (_hold_under_forces,),
+    JOINED_UNDER_FORCES: (_fly_under_forces,),
     LOOP: (_go_from_event_to_event,),
 }
 """What is compiled at once, by kind; each gets a run."""

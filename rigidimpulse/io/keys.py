@@ -15,6 +15,7 @@ at the share s of the way. Impacts between frames, which straight lines cut off,
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -41,6 +42,10 @@ STRAIGHT = 1e-6
 """Sine of the half angle below which the direction of a rotation is that of the angular velocity."""
 
 
+BEND, BEND_LEAST, TWIST = 0.01, 1e-4, 0.02
+"""Share of the way from key to key, m, and rad, by which the middle may be off: more than the share and the length, or than the angle."""
+HALVINGS = 10
+MOST_KEYS = 1_000_000
 AGREE = 0.02
 """Share of the way between two frames, and angle in rad, within which both sides agree on the pose at an impact."""
 LEAST = 1e-3
@@ -176,6 +181,31 @@ def _bends(times: np.ndarray, centers: np.ndarray, velocities: np.ndarray) -> np
     off = np.diff(centers, axis=0) - 0.5 * dt * (velocities[:-1] + velocities[1:])
     flies = np.linalg.norm(off, axis=1) <= AGREE * np.linalg.norm(bend, axis=1)
     return np.where(flies[:, None], bend, 0.0)
+
+
+def refined(times: np.ndarray, poses: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]) -> Keys:
+    """Return keys at times (k,) s, and more halfway between two as long as a straight way and an even turn miss the middle.
+
+    poses: gives positions (t, 3) m and quaternions (t, 4) wxyz at times (t,) s.
+    """
+    x, q = poses(times)
+    left = np.arange(len(times) - 1)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (times[left] + times[left + 1])
+        at, turned = poses(middle)
+        way = np.linalg.norm(x[left + 1] - x[left], axis=1)
+        off = np.linalg.norm(at - 0.5 * (x[left] + x[left + 1]), axis=1)
+        half = 0.5 * rotation_vector(multiply(q[left + 1], conjugate(q[left])))
+        astray = angle_between(multiply(quaternion_from_rotation_vector(half), q[left]), turned)
+        bad = ((off > BEND * way) & (off > BEND_LEAST)) | (astray > TWIST)
+        if not bad.any() or len(times) > MOST_KEYS:
+            break
+        place = left[bad] + 1
+        times = np.insert(times, place, middle[bad])
+        x, q = np.insert(x, place, at[bad], axis=0), np.insert(q, place, turned[bad], axis=0)
+        new = place + np.arange(len(place))
+        left = np.sort(np.concatenate([new - 1, new]))
+    return Keys(times, x, quaternion_continuity(q))
 
 
 def reduced(keys: Keys, reach: float, tolerance: float) -> np.ndarray:

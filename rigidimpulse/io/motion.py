@@ -44,9 +44,8 @@ class Motion:
     """
 
     def __init__(self, run: Recording, options: ExportOptions) -> None:
-        """Raise a `SceneError` for a bad option, or a pose that is not finite."""
+        """Raise a `SceneError` for a pose that is not finite; the options are checked, see `check_options`."""
         assert run.scene is not None
-        check_options(options)
         if not (np.isfinite(run.positions).all() and np.isfinite(run.orientations).all()):
             raise SceneError("a pose of the run is not finite", "look at run.status")
         self.scene: Scene = run.scene

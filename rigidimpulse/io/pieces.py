@@ -94,28 +94,28 @@ class Weight(NamedTuple):
     inertia: np.ndarray
 
 
-def weighed(pieces: list[Piece], masses: Sequence[float | None], densities: Sequence[float]) -> Weight:
-    """Return the mass properties of pieces of unlike density.
-
-    Args:
-        pieces: colliders; of open meshes the hull counts. masses: kg, None where density says. densities: kg/m^3.
+def weight_of(piece: Piece, mass: float | None, density: float) -> Weight:
+    """Return the mass properties of a piece, of its hull if it is open; mass: kg, None where density [kg/m^3] says.
 
     Raises:
-        SceneError: a piece has no volume.
+        SceneError: it has no volume.
 
     """
-    parts = []
-    for piece, mass, density in zip(pieces, masses, densities, strict=True):
-        try:
-            solid = Shape.compound([(piece.shape, piece.position, piece.orientation)]).solid()
-        except SceneError:
-            solid = Shape.compound([(_hull(piece.shape), piece.position, piece.orientation)]).solid()
-        parts.append((density if mass is None else mass / solid.volume, solid))
-    total = sum(density * solid.volume for density, solid in parts)
-    centre = sum((density * solid.volume * solid.centroid for density, solid in parts), np.zeros(3)) / total
+    try:
+        solid = Shape.compound([(piece.shape, piece.position, piece.orientation)]).solid()
+    except SceneError:
+        solid = Shape.compound([(_hull(piece.shape), piece.position, piece.orientation)]).solid()
+    density = density if mass is None else mass / solid.volume
+    return Weight(density * solid.volume, solid.centroid, density * solid.inertia)
+
+
+def summed(parts: Sequence[Weight]) -> Weight:
+    """Return the mass properties of parts together."""
+    total = sum(part.mass for part in parts)
+    centre = sum((part.mass * part.center_of_mass for part in parts), np.zeros(3)) / total
     inertia = np.zeros((3, 3))
-    for density, solid in parts:
-        inertia += density * (solid.inertia + moved_unit(solid.centroid - centre) * solid.volume)
+    for part in parts:
+        inertia += part.inertia + part.mass * moved_unit(part.center_of_mass - centre)
     return Weight(total, centre, inertia)
 
 

@@ -9,10 +9,11 @@ ANIMATED = "an animated file"
 
 register_exporter((".npz",), "rigidimpulse.io.npz:write_npz")
 register_exporter((".csv",), "rigidimpulse.io.table:write_csv")
-register_exporter((".glb", ".gltf"), "rigidimpulse.io.gltf.animate:write_gltf", needs_shapes=ANIMATED, takes_options=True)
-register_exporter(
-    (".usda", ".usdc", ".usd", ".usdz"), "rigidimpulse.io.usd.animate:write_usd", needs_shapes=ANIMATED, takes_options=True
-)  # fmt: skip
+for suffixes, module in (((".glb", ".gltf"), "gltf"), ((".usda", ".usdc", ".usd", ".usdz"), "usd")):
+    register_exporter(
+        suffixes, f"rigidimpulse.io.{module}.animate:write_{module}", needs_shapes=ANIMATED, takes_options=True,
+        check=f"rigidimpulse.io.{module}.animate:check_{module}",
+    )  # fmt: skip
 register_reader((".npz",), "rigidimpulse.io.npz:read_npz")
 register_reader((".h5", ".hdf5"), "rigidimpulse.io.cache.load:load_cache")
 provide("write scene", "rigidimpulse.io.scene_file:write_scene")

@@ -8,7 +8,7 @@ import numpy as np
 
 from rigidimpulse.core.kernels import inlined, jit, jit_making_arrays
 from rigidimpulse.core.quaternion import quaternion_to_matrix
-from rigidimpulse.motion.trajectory import FIXED, JERK, TORQUE_RATE, rate_of, row_at, state_at
+from rigidimpulse.motion.trajectory import FIXED, JERK, PRESCRIBED, TORQUE_RATE, rate_of, row_at, state_at
 
 
 @jit
@@ -46,10 +46,12 @@ def bring(trajectory, i, time, bodies, rotation, acceleration, angular_accelerat
     for k in range(3):
         acceleration[i, k] = 0.0
         angular_acceleration[i, k] = 0.0
-    if bodies.inv_mass[i] > 0.0 and trajectory.mode[i] != FIXED:
-        # The accelerations of the trajectory's load at this instant, with the gyroscopic term.
-        s = time - trajectory.start[i]
-        acceleration[i, 0], acceleration[i, 1], acceleration[i, 2] = row_at(trajectory.acceleration, i, rate_of(trajectory, i, JERK), s)
+    if trajectory.mode[i] == FIXED or (bodies.inv_mass[i] == 0.0 and trajectory.mode[i] != PRESCRIBED):
+        return
+    s = time - trajectory.start[i]
+    acceleration[i, 0], acceleration[i, 1], acceleration[i, 2] = row_at(trajectory.acceleration, i, rate_of(trajectory, i, JERK), s)
+    if bodies.inv_mass[i] > 0.0:
+        # The angular acceleration of the trajectory's load at this instant, with the gyroscopic term.
         torque = row_at(trajectory.torque, i, rate_of(trajectory, i, TORQUE_RATE), s)
         gyroscopic_acceleration(rotation[i], trajectory.inertia[i], bodies.angular_velocity[i], torque, angular_acceleration[i])
 

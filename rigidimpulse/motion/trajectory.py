@@ -3,7 +3,7 @@
     x(t) = x0 + v0 s + 1/2 a s^2 + 1/6 j s^3,    v(t) = v0 + a s + 1/2 j s^2,    s = t - start
     rotation, by mode:
       FIXED        none, the body never moves
-      PRESCRIBED   q(t) = exp(w0 s) q0, constant velocity and world angular velocity (its acceleration must be 0)
+      PRESCRIBED   q(t) = exp(w0 s) q0, constant world angular velocity
       FREE         no torque: closed form (free_rotation)
       FORCED       world torque tau0 + tau1 s: power series (forced_rotation)
       LINEAR       as PRESCRIBED, with a constant acceleration: the path to a pose that the sub-stepped solver found; the body's own
@@ -73,7 +73,7 @@ class Trajectories(NamedTuple):
 
     @property
     def jerk(self) -> np.ndarray:
-        """(n, 3) m/s^3, constant, a view; 0 except in modes FREE and FORCED: `begin` sets it."""
+        """(n, 3) m/s^3, constant, a view; 0 in modes FIXED and LINEAR: `begin` sets it."""
         return self.top[:, JERK:TORQUE_RATE]
 
     @property
@@ -126,7 +126,7 @@ def begin(trajectory, i):
 @inlined
 def begin_straight(trajectory, i):
     """The same in modes PRESCRIBED and LINEAR: apart, so that it is compiled into loops over thousands of bodies."""
-    for k in range(JERK, TOP_SIZE):
+    for k in range(TORQUE_RATE if trajectory.mode[i] == PRESCRIBED else JERK, TOP_SIZE):
         trajectory.top[i, k] = 0.0
     free_rotation.keep_axis(trajectory.orientation[i], trajectory.angular_velocity[i], trajectory.top[i])
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.providers import load_function
@@ -54,12 +54,15 @@ class Exporter(NamedTuple):
         function: "module:function"; it is called with the recording and an `ExportTarget`.
         needs_shapes: what is written, for the message where the recording has no scene and so no shapes; None: it needs no shapes.
         takes_options: whether the format has the options of `ExportOptions`.
+        check: "module:function", called with the path, the options and the scene, None before there is one; raises a `SceneError`
+            for what cannot be written, before anything is simulated. None: the format takes everything.
 
     """
 
     function: str
     needs_shapes: str | None
     takes_options: bool
+    check: str | None = None
 
     def write(self, run: Recording, target: ExportTarget) -> None:
         """Write the recording."""
@@ -70,10 +73,12 @@ _EXPORTERS: dict[str, Exporter] = {}
 _READERS: dict[str, str] = {}
 
 
-def register_exporter(suffixes: Sequence[str], function: str, *, needs_shapes: str | None = None, takes_options: bool = False) -> None:
+def register_exporter(
+    suffixes: Sequence[str], function: str, *, needs_shapes: str | None = None, takes_options: bool = False, check: str | None = None
+) -> None:
     """Register the function that writes files of these suffixes; see `Exporter`."""
     for suffix in suffixes:
-        _EXPORTERS[suffix] = Exporter(function, needs_shapes, takes_options)
+        _EXPORTERS[suffix] = Exporter(function, needs_shapes, takes_options, check)
 
 
 def register_reader(suffixes: Sequence[str], function: str) -> None:
@@ -102,6 +107,28 @@ def find_exporter(path: Path) -> Exporter:
     if path.suffix not in _EXPORTERS:
         raise SceneError(f"cannot export to {path.name!r}", f"use a name that ends in {', '.join(_EXPORTERS)}")
     return _EXPORTERS[path.suffix]
+
+
+def check_export(path: Path, options: ExportOptions, scene: Any = None) -> Exporter:
+    """Return the exporter for a path after a look at what is asked for, as far as it is known before there is a run.
+
+    Args:
+        path: the file to write. options: of animated files. scene: of the run, None if it is not known.
+
+    Raises:
+        SceneError: for another suffix, for an option that makes no sense, that the format does not have, or that does not fit the scene,
+            or where the file would take the place of the one that the scene comes from.
+
+    """
+    exporter = find_exporter(path)
+    if options != ExportOptions() and not exporter.takes_options:
+        names = "start_frame, tolerance, impact_keys, only_moved, samples, up_axis or unit"
+        raise SceneError(f"{names} for {path.name!r}", f"give them for {', '.join(export_suffixes(with_options=True))} only")
+    if exporter.check is not None:
+        load_function(exporter.check)(path, options, scene)
+    if scene is not None and scene.origin is not None:
+        scene.origin.check_target(path)
+    return exporter
 
 
 def find_reader(path: str | os.PathLike[str]) -> Callable[[Path], Recording]:

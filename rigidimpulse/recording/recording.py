@@ -14,7 +14,7 @@ from rigidimpulse.core.errors import SceneError, unknown_name
 from rigidimpulse.core.files import write_renamed
 from rigidimpulse.core.providers import provider
 from rigidimpulse.recording.contacts import CONTACT_DTYPE, forces_on
-from rigidimpulse.recording.exporters import ExportOptions, ExportTarget, export_suffixes, find_exporter, find_reader
+from rigidimpulse.recording.exporters import ExportOptions, ExportTarget, check_export, find_reader
 from rigidimpulse.recording.profile import Profile
 from rigidimpulse.recording.status import Status
 
@@ -268,15 +268,10 @@ class Recording:
 
         """
         path = Path(path)
-        exporter = find_exporter(path)
         options = ExportOptions(start_frame, tolerance, impact_keys, only_moved, samples, up_axis, unit)
-        if options != ExportOptions() and not exporter.takes_options:
-            names = "start_frame, tolerance, impact_keys, only_moved, samples, up_axis or unit"
-            raise SceneError(f"{names} for {path.name!r}", f"give them for {', '.join(export_suffixes(with_options=True))} only")
+        exporter = check_export(path, options, self.scene)
         if exporter.needs_shapes is not None:
             self._need_scene(exporter.needs_shapes)
-        if self.scene is not None and self.scene.origin is not None:
-            self.scene.origin.check_target(path)
         return write_renamed(path, lambda target: exporter.write(self, ExportTarget(target, path.stem, options)))
 
     def show(self) -> Any:

@@ -203,3 +203,12 @@ def test_on_the_command_line(tmp_path: Path) -> None:
     t = np.arange(25) / 48
     assert np.abs(heights - (1 - 9.81 * t**2 / 2)).max() < SINGLE
     assert len((tmp_path / "out.csv").read_text().splitlines()) == 14
+
+
+def test_a_joint_to_a_prim_that_is_not_there_is_told(tmp_path: Path) -> None:
+    """The side without a prim counted as the world without a word."""
+    file = File()
+    file.body("/a")
+    file.collider("/a/shape", "Cube", size=1.0)
+    file.joint("/hinge", "PhysicsRevoluteJoint", "/a", "/nowhere")
+    assert [line for line in file.load(tmp_path).report if "'hinge'" in line and "/nowhere" in line]

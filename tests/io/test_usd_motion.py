@@ -1,6 +1,6 @@
 """Motion into USD files, read back by usd-core itself: every body is where the run has it, at every frame.
 
-Positions are double, orientations single precision: to 1e-6 for matrices of unit size. A wrong order of quaternion components,
+Transforms are in double precision; those of meshes are to 1e-6. A wrong order of quaternion components,
 operations in the wrong order or a frame off by one show as errors of the size of the motion.
 """
 
@@ -198,6 +198,24 @@ def test_samples_between_frames_are_on_the_parabola(tmp_path: Path) -> None:
         run.export(tmp_path / "out.usda", samples=0)
 
 
+def test_small_turns_and_far_places_survive(tmp_path: Path) -> None:
+    """A beam turns by 2e-3 rad, and stands 1 km away in a stage whose up axis is another: its tip, 10 m off, is where the run has it.
+
+    In single precision the file had turns below 1e-3 rad as none or 7e-4 rad, 2 mm at the tip, and its root was off by 3.4e-5 m at 1 km.
+    """
+    angle = np.linspace(0.0, 2e-3, 25)
+    q = np.column_stack([np.cos(0.5 * angle), 0 * angle, 0 * angle, np.sin(0.5 * angle)])
+    scene = ri.Scene(bodies=[ri.Body("beam", ri.Shape.box((20, 1, 1)), position=(1000, 700, 5))])
+    run = recorded(scene, {"beam": (np.tile([1000.0, 700.0, 5.0], (25, 1)), q)})
+    for axis in ("z", "y"):
+        stage = opened(run.export(tmp_path / f"{axis}.usda", up_axis=axis))
+        back = np.eye(3) if axis == "z" else np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+        for k in range(25):
+            now = world(stage, "/World/beam", k)
+            tip = np.array([1000 + 10 * np.cos(angle[k]), 700 + 10 * np.sin(angle[k]), 5.0])
+            assert np.abs(back @ (now[:3, :3] @ [10, 0, 0] + now[:3, 3]) - tip).max() < 1e-6
+
+
 def test_who_has_keys(tmp_path: Path) -> None:
     """Bodies that stand have none, unless all are asked for; a tolerance leaves out what lies in between."""
     scene = ri.Scene(bodies=[ri.Body("a", ri.Shape.box(1)), ri.Body("b", ri.Shape.box(1), position=(9, 0, 0))])
@@ -239,7 +257,7 @@ def test_the_validators_of_usd_find_nothing(tmp_path: Path) -> None:
 
 
 def test_a_thousand_bodies(tmp_path: Path) -> None:
-    """240 frames of 1,000 bodies: all samples are there, 56 bytes a pose: 24 + 16, and 16 that say where."""
+    """240 frames of 1,000 bodies: all samples are there, 72 bytes a pose: 24 + 32, and 16 that say where."""
     from rigidimpulse.recording.events import IMPACT_DTYPE
     from rigidimpulse.recording.recording import Recording
 
@@ -251,7 +269,7 @@ def test_a_thousand_bodies(tmp_path: Path) -> None:
     still = np.zeros((frames, count, 3))
     run = Recording(np.arange(frames) / 24, list(scene.names), x, q, still, still, x, np.zeros(0, IMPACT_DTYPE), scene=scene)
     path = run.export(tmp_path / "out.usdc")
-    assert frames * count * 56 < path.stat().st_size < frames * count * 58
+    assert frames * count * 72 < path.stat().st_size < frames * count * 74
     stage = opened(path)
     assert stage.GetPrimAtPath("/World/b999").GetAttribute("xformOp:orient").GetNumTimeSamples() == frames
 

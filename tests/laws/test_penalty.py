@@ -149,6 +149,42 @@ def test_friction_slows_by_mu_g() -> None:
     assert abs(stopped.velocity("block")[-1, 0]) < 1e-4
 
 
+def ground(kind: str) -> ri.Shape:
+    """A floor, its top 0.5 m above its origin."""
+    if kind == "half space":
+        return ri.Shape.half_space((0, 0, 1), 0.5)
+    if kind == "box":
+        return ri.Shape.box((10, 10, 1))
+    corners = [(a, b, c) for a in (-5.0, 5.0) for b in (-5.0, 5.0) for c in (-0.5, 0.5)]
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return ri.Shape.mesh(corners, [triangle for a, b, c, d in sides for triangle in ((a, b, c), (a, c, d))])
+
+
+@pytest.mark.parametrize("kind", ["half space", "box", "mesh"])
+@pytest.mark.parametrize("spin", [0.0, 10.0])
+def test_balls_and_capsules_come_to_roll(kind: str, spin: float) -> None:
+    """Angular momentum about the line of contact is kept, w = v / r at the end: v = (v0 + i r w0) / (1 + i), i = I / (m r^2).
+
+    A ball that slides at 1 m/s ends with 5/7 m/s, one that rolls (w0 = 10 rad/s, r = 0.1 m) goes on with 1 m/s. Below a slip of about
+    mu N / c_t friction is a damper: what is left of the slip after 0.5 s is less than 1e-3. With friction at the centre, both stood still.
+    What presses is the weight alone: they sink by m g / k at each point, a capsule has two.
+    """
+    stiffness, mass, length = 1e5, 1.0, 0.4
+    tube, caps = math.pi * RADIUS**2 * length, 4.0 / 3.0 * math.pi * RADIUS**3
+    scene, material = ri.Scene(gravity=(0, 0, -G)), ri.Material(static_friction=0.5)
+    scene.add(ri.Body("floor", ground(kind), position=(0, 0, -0.5), motion="static", material=material))
+    moving = {"velocity": (1, 0, 0), "mass": mass, "material": material}
+    scene.add(ri.Body("ball", ri.Shape.sphere(RADIUS), position=(0, 0, RADIUS), angular_velocity=(0, spin, 0), **moving))
+    across = {"position": (0, 2, RADIUS), "orientation": (math.sqrt(0.5), math.sqrt(0.5), 0, 0), "angular_velocity": (0, spin, 0)}
+    scene.add(ri.Body("roller", ri.Shape.capsule(RADIUS, length), **across, **moving))
+    run = ri.simulate(scene, 0.5, accuracy=penalty(penalty_stiffness=stiffness))
+    for name, i, points in (("ball", 0.4, 1), ("roller", (0.5 * tube + 0.4 * caps) / (tube + caps), 2)):
+        law = (1.0 + i * RADIUS * spin) / (1.0 + i)
+        assert run.velocity(name)[-1, 0] == pytest.approx(law, abs=1e-3)
+        assert run.angular_velocity(name)[-1, 1] * RADIUS == pytest.approx(law, abs=1e-3)
+        assert RADIUS - run.position(name)[-1, 2] == pytest.approx(mass * G / (points * stiffness), rel=1e-3)
+
+
 def shot(accuracy: ri.Accuracy) -> ri.Recording:
     """A ball of 100 m/s and a wall of 1 cm."""
     scene = ri.Scene(gravity=(0, 0, 0))

@@ -7,7 +7,8 @@
 
 s is the depth of p in the solid, negative outside. A box, hull or mesh has its corners for points (radius 0), a sphere its centre, a
 capsule the two ends of its axis, and where a corner of a surface comes at the middle of its axis that one. Each point has its own spring,
-and both bodies are pushed along the same line.
+and both bodies are pushed along the same line. They are pushed, and friction acts, where the body is deepest: at p - r n, on the surface of
+a sphere or capsule, so that friction turns it. Two spheres or capsules are pushed at the middle of their overlap.
 
 The nearest surface point of a corner is looked for on faces that push it back into its own body (n.m > 0, m the mean direction of its
 edges): otherwise the corners of a box that stands flush on another would be pushed out through its side. The test whether a point is inside
@@ -44,7 +45,8 @@ def _points_in_half_space(solids, plane, other, bodies, poses, points, count):
             p = moved(rotation[b], row(position, b), row(geometry.vertex, v))
             depth = offset + geometry.radius[other] - dot(normal, p)
             if depth > 0.0:
-                count = add_point(points, count, bodies, (-1 - plane, v), p, normal, depth)
+                deepest = along(p, -geometry.radius[other], normal)
+                count = add_point(points, count, bodies, (-1 - plane, v), deepest, normal, depth)
     return count
 
 
@@ -101,7 +103,8 @@ def _points_in_surface(solids, surface, other, bodies, poses, points, count):
             normal = (out[0] / distance, out[1] / distance, out[2] / distance)
         depth = radius + (dot(out, normal) if inside else -distance)
         if depth > 0.0:
-            count = add_point(points, count, bodies, (-1 - surface, v), world, turned(rotation[a], normal), depth)
+            normal = turned(rotation[a], normal)
+            count = add_point(points, count, bodies, (-1 - surface, v), along(world, -radius, normal), normal, depth)
     return count
 
 

@@ -30,8 +30,26 @@ from rigidimpulse.core.quaternion import quaternion_to_matrix
 from rigidimpulse.core.vector import along, cross, dot, length, row, scaled, subtract
 from rigidimpulse.motion.trajectory import pose_at
 
+MOST_OF_IT = 0.5
+"""Part of the length of a vector that must be across an axis: less of it is round-off."""
 _EPSILON = 2.0**-52
 _TRUNCATION = 0.2  # kappa_1 of the ITP method times the first bracket; kappa_2 = 2, n_0 = 1
+
+
+@jit
+def _beside(across, axis):
+    """The direction of a vector across an axis; zero where all of it is round-off.
+
+    An axis is a unit vector to round-off. Along a normal that is parallel to it, the vector is round-off, and lies along the axis: as
+    a direction it put the point of a cylinder that stood upright a radius beyond its end.
+    """
+    size = length(across)
+    if size == 0.0:
+        return across
+    unit = scaled(across, 1.0 / size)
+    beside = along(unit, -dot(unit, axis), axis)
+    size = length(beside)
+    return scaled(beside, 1.0 / size if size > MOST_OF_IT else 0.0)
 
 
 @jit
@@ -46,11 +64,10 @@ def support_point(geometry, primitive, element, normal):
     if kind[primitive] == CYLINDER:
         axis = (frame[primitive, 3], frame[primitive, 4], frame[primitive, 5])
         cosine = dot(normal, axis)
-        across = along(normal, -cosine, axis)
-        size = length(across)
+        across = _beside(along(normal, -cosine, axis), axis)
         half_height = frame[primitive, 6]
         point = along(row(frame, primitive), half_height if cosine > 0.0 else -half_height, axis)
-        return along(point, radius[primitive] / size if size > 0.0 else 0.0, across)
+        return along(point, radius[primitive], across)
     best = -inf
     point = (0.0, 0.0, 0.0)
     for k in range(3 if element >= 0 else 1):

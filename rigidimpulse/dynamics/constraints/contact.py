@@ -16,7 +16,8 @@ velocity is set to zero in the metric of mass, which only dissipates. Otherwise 
 would hover for ever.
 
 A contact that slips may stop within the sub-step, and its friction changes there, also where it slips back: the sub-step ends at the
-first such time (see `stop_split`). The same holds for rolling and spinning friction (see `rolling_friction`).
+first such time. Where the slip turns, friction turns with it (see `stop_split`). The same holds for rolling and spinning friction (see
+`rolling_friction`).
 """
 
 from typing import NamedTuple
@@ -37,7 +38,7 @@ from rigidimpulse.dynamics.constraints.rows import (
     take_rows,
 )
 from rigidimpulse.dynamics.constraints.slip import set_friction, solve_rows, solve_until_slip, solve_with_slip
-from rigidimpulse.dynamics.constraints.stop_split import any_stops, end_slides, find_slips, first_stop, start_slides
+from rigidimpulse.dynamics.constraints.stop_split import any_stops, end_slides, find_slips, first_stop, middle_of_slips, start_slides
 from rigidimpulse.model.contacts import Contacts
 from rigidimpulse.motion.body_state import BodyState
 
@@ -148,8 +149,11 @@ def hold_contacts(solve, problem, sub_step, force, wrench, rolling):
             break
         found = attempt(solve, problem, of_contacts, sub_step.excess, h, rolling)
     slips, residual = find_slips(problem, of_contacts, found.slides, found.velocity, rolling, SLIP * found.scale), found.residual
-    if slips.first.shape[0] > 0 and residual <= POOR and any_stops(rows, problem.members.shape[0], slips, SLIP * found.scale):
-        residual, h = end_at_stop(problem, sub_step, of_contacts, slips, found)
+    if slips.first.shape[0] > 0 and residual <= POOR:
+        if any_stops(rows, problem.members.shape[0], slips, SLIP * found.scale):
+            residual, h = end_at_stop(problem, sub_step, of_contacts, slips, found)
+        else:
+            residual = turn_friction(problem, of_contacts, slips, found)
     world_force = add_contact_wrench(contacts, rows, first_row, frames, h, force, wrench)
     add_rolling_wrench(contacts, rolling, rows, frames, h, rows.bias.shape[0] - extra, wrench)
     return Held(residual, h, found.slides, world_force)
@@ -198,6 +202,28 @@ def end_at_stop(problem, sub_step, of_contacts, slips, found):
         return residual, stop
     copy_vector(whole, rows.impulse)
     return found.residual, h
+
+
+@jit_making_arrays
+def turn_friction(problem, of_contacts, slips, found):
+    """Give slips that turn the friction of their middle, see `stop_split`; none of them stops.
+
+    found: the `Attempt` whose impulses the rows have. Returns the residual of those that are kept.
+    """
+    rows, contacts, n = of_contacts.rows, problem.contacts, problem.members.shape[0]
+    middle, turns = middle_of_slips(rows, n, slips)
+    if not turns:
+        return found.residual
+    before, slow = rows.impulse.copy(), SLIP * found.scale
+    set_friction(of_contacts, contacts, found.slides)
+    kinds = start_slides(of_contacts, middle, found.velocity, np.inf)
+    residual = solve_until_slip(None, of_contacts, n, contacts, SOLVE_TOLERANCE * found.scale, slow) / found.scale
+    end_slides(of_contacts, kinds)
+    # Along a bend friction may jam, or stop what slips: then it stays as it was.
+    if residual <= max(found.residual, POOR) and not any_stops(rows, n, slips, slow):
+        return residual
+    copy_vector(before, rows.impulse)
+    return found.residual
 
 
 @jit_with_callbacks

@@ -5,6 +5,9 @@ the Jacobian of the joints' rows and f their forces:
 
     M v' = F + J^T f,   J v = 0        so that        W f = -(J M^-1 F + c),   W = J M^-1 J^T,   c = (dJ/dt) v
 
+F holds gravity, constant forces, the forces that vary (evaluated in Python, stage by stage: `take_stage`), and springs, dampers and drives
+of joints: f = -k x - d (u - r), at most what the row may exert. What is too stiff for the method makes its steps too short to be worth it.
+
 c is the change of the rates u along the present motion, v held constant; with e a time in which bodies turn by LOOK,
 
     c = (8 (u(e) - u(-e)) - (u(2e) - u(-2e))) / 12 e,   u(s) = J(x at s) v        off by (LOOK)^4 / 30 of itself: round-off
@@ -31,13 +34,14 @@ from scipy.integrate import DOP853
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.core.quaternion import exponential, product, quaternion_to_matrix
 from rigidimpulse.core.tolerances import TOLERANCES
-from rigidimpulse.core.vector import turned, turned_back
+from rigidimpulse.core.vector import copy_matrix, turned, turned_back
 from rigidimpulse.dynamics.constraints.joint import add_forces, is_linear, joint_rows, joint_values, relative_point_velocity
-from rigidimpulse.dynamics.constraints.joint_limits import is_reached, limit_side
+from rigidimpulse.dynamics.constraints.joint_limits import is_reached, joint_weights, limit_side, spring_of
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, count_joint_rows
 from rigidimpulse.dynamics.constraints.rows import (
     BOUNDED,
     FREE,
+    Rows,
     change_velocities,
     changes_of,
     make_rows,
@@ -52,6 +56,8 @@ from rigidimpulse.motion.trajectory import FORCED, Load, pose_at, take
 from rigidimpulse.scene.joint_coordinates import RADIUS
 
 STAGES = 12
+STAGE_TIMES, STAGE_WEIGHTS = DOP853.C[:STAGES], DOP853.B
+BEGIN, END, PATHS, MOVE = -1, STAGES, STAGES + 1, STAGES + 2
 _STAGE, _END = np.ascontiguousarray(DOP853.A[:STAGES, :STAGES]), np.ascontiguousarray(DOP853.B)
 _THIRD, _FIFTH = np.ascontiguousarray(DOP853.E3), np.ascontiguousarray(DOP853.E5)
 LOOK: float = 1e-3
@@ -77,7 +83,18 @@ class JointedFlight(NamedTuple):
     rate: np.ndarray  # (n, 6) their change a second
     start: np.ndarray  # (j, 3) N on b at the start
     mean: np.ndarray  # (j, 3) N on b
-    held: np.ndarray  # (k,) bool, rows that hold; the others carry nothing
+    held: np.ndarray  # (k,) bool, rows that hold; of the others springs act, and the rest carries nothing
+    load: np.ndarray  # (n, 6) N, N m of forces that vary, at the present stage
+
+
+class Stages(NamedTuple):
+    """Working memory of a step of n members with s rows."""
+
+    rows: Rows
+    direction: np.ndarray  # (s, 3)
+    start: np.ndarray  # (n, 13) states at the start: pose and velocities
+    at: np.ndarray  # (n, 13) states at the present stage
+    slope: np.ndarray  # (STAGES, n, 13)
 
 
 def make_flight(inv_mass: np.ndarray, size: float, num_joints: int, num_rows: int) -> JointedFlight:
@@ -86,8 +103,14 @@ def make_flight(inv_mass: np.ndarray, size: float, num_joints: int, num_rows: in
     bodies = BodyState(np.zeros((n, 3)), np.zeros((n, 4)), np.zeros((n, 3)), np.zeros((n, 3)), inv_mass, np.zeros((n, 3, 3)))
     return JointedFlight(
         bodies, np.zeros((n, 3, 3)), size, np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((num_joints, 3)), np.zeros((num_joints, 3)),
-        np.zeros(num_rows, bool),
+        np.zeros(num_rows, bool), np.zeros((n, 6)),
     )  # fmt: skip
+
+
+@jit_making_arrays
+def make_stages(n, rows):
+    """Working memory for a step of n members with these rows."""
+    return Stages(rows, np.empty((rows.bias.shape[0], 3)), np.empty((n, 13)), np.empty((n, 13)), np.empty((STAGES, n, 13)))
 
 
 @jit_making_arrays
@@ -120,6 +143,27 @@ def fly_jointed(island, flight, steady, h):
 
 
 @jit_making_arrays
+def take_stage(island, flight, stages, steady, h, stage):
+    """A flight of h s stage by stage, for forces that vary: from BEGIN to END, with what acts at a stage in flight.load.
+
+    Where a stage has been taken, flight.bodies are at the next one. At the END paths may be laid (PATHS), or the members be moved there
+    (MOVE). Returns the error, by how much joints are open, and by how much paths end elsewhere, as `fly_jointed` does, of what is known by
+    then: the error is 0 before the END if all is well. The caller restores memory.angle where it does not move the members.
+    """
+    if stage == BEGIN:
+        return 0.0 if _begin(island, flight, stages, h) else inf, 0.0, 0.0
+    if stage < END:
+        return _take(island, flight, stages, steady, h, stage), 0.0, 0.0
+    if stage == END:
+        return _finish(island, flight, stages, h), 0.0, 0.0
+    if stage == PATHS:
+        missed = _lay_paths(island, flight, steady, h)
+        return 0.0, _open_by(island, flight, h), missed
+    _move(island, flight)
+    return 0.0, 0.0, 0.0
+
+
+@jit_making_arrays
 def fly_past(island, flight, steady, span, allowed, plan):
     """Fly the members of a `JointedIsland` for `span` s, in as many steps as their errors ask for: nobody looks at them on the way.
 
@@ -127,9 +171,7 @@ def fly_past(island, flight, steady, span, allowed, plan):
     flight.mean is written. Returns for how long they were flown, less than `span` where a step cannot be taken, and the length that the
     next step may have.
     """
-    bodies, ahead, which, flown, trials = island.bodies, flight.bodies, island.which, 0.0, 0
-    total, value = np.zeros_like(flight.mean), np.empty(count_joint_rows(island.joints, island.which))
-    angles = np.empty_like(island.memory.angle)
+    which, flown, trials, total, angles = island.which, 0.0, 0, np.zeros_like(flight.mean), np.empty_like(island.memory.angle)
     while flown < span and trials < MOST_TRIALS:
         pieces = ceil((span - flown) / plan)
         h = (span - flown) / pieces
@@ -138,20 +180,13 @@ def fly_past(island, flight, steady, span, allowed, plan):
         if not isfinite(error):
             island.memory.angle[:] = angles
             break
-        way = (error / allowed) ** (1.0 / 8.0)
-        follows = length_that_follows(h, way)
-        if way > 1.0:
+        done, plan = next_length(h, plan, error / allowed)
+        if not done:
             island.memory.angle[:] = angles
-            plan, trials = follows, trials + 1
+            trials += 1
             continue
-        plan, trials = max(follows, plan) if h < plan else follows, 0
-        for i in island.members:
-            for c in range(3):
-                bodies.position[i, c], bodies.velocity[i, c] = ahead.position[i, c], ahead.velocity[i, c]
-                bodies.angular_velocity[i, c] = ahead.angular_velocity[i, c]
-            bodies.orientation[i] = ahead.orientation[i]
-        refresh_pose(island.members, bodies, island.rotation, island.memory.trial.inertia)
-        joint_values(island.joints, which, bodies.position, island.rotation, island.memory.angle, value)
+        trials = 0
+        _move(island, flight)
         for j in which:
             for c in range(3):
                 total[j, c] += h * flight.mean[j, c]
@@ -164,6 +199,29 @@ def fly_past(island, flight, steady, span, allowed, plan):
     return flown, plan
 
 
+@jit_making_arrays
+def _move(island, flight):
+    """Move the members to where the flight is."""
+    bodies, ahead, value = island.bodies, flight.bodies, np.empty(count_joint_rows(island.joints, island.which))
+    for i in island.members:
+        for c in range(3):
+            bodies.position[i, c], bodies.velocity[i, c] = ahead.position[i, c], ahead.velocity[i, c]
+            bodies.angular_velocity[i, c] = ahead.angular_velocity[i, c]
+        bodies.orientation[i] = ahead.orientation[i]
+    refresh_pose(island.members, bodies, island.rotation, island.memory.trial.inertia)
+    joint_values(island.joints, island.which, bodies.position, island.rotation, island.memory.angle, value)
+
+
+@jit
+def next_length(h, plan, error):
+    """Whether a step of h s is good enough, and the length of the next one; plan: s, what it might have had; error: 1 at the bound."""
+    way = error ** (1.0 / 8.0)
+    follows = length_that_follows(h, way)
+    if way > 1.0:
+        return False, follows
+    return True, max(follows, plan) if h < plan else follows
+
+
 @jit
 def length_that_follows(h, way):
     """Length of the step after one of h s whose error is `way` of the bound, as a length: 1 at the bound."""
@@ -173,40 +231,69 @@ def length_that_follows(h, way):
 @jit_making_arrays
 def _step(island, flight, steady, h):
     """One step of h s: flight.bodies are moved, from where the members are; returns its error, see `fly_jointed`."""
-    joints, which, members, memory, bodies = island.joints, island.which, island.members, island.memory, island.bodies
-    n, count = members.shape[0], count_joint_rows(joints, which)
-    ahead = JointedIsland(joints, which, flight.bodies, flight.rotation, members, island.number, memory, island.allowed)
-    rows, direction, inertia = make_rows(count), np.empty((count, 3)), memory.trial.inertia
-    y, at, slope = np.empty((n, 13)), np.empty((n, 13)), np.empty((STAGES, n, 13))
-    for k in range(n):
-        island.number[members[k]] = k
-        _read_state(bodies, members[k], y[k])
-    _place_supports(island, flight)
-    for j in which:
-        for r in range(3):
-            flight.start[j, r] = flight.mean[j, r] = 0.0
-    _write_states(ahead, inertia, y)
-    if not _choose_rows(ahead, flight.held, rows, direction, h):
+    stages = make_stages(island.members.shape[0], make_rows(count_joint_rows(island.joints, island.which)))
+    if not _begin(island, flight, stages, h):
         return inf
     for stage in range(STAGES):
-        for k in range(n):
-            for c in range(13):
-                step = 0.0
-                for s in range(stage):
-                    step += _STAGE[stage, s] * slope[s, k, c]
-                at[k, c] = y[k, c] + h * step
-        _write_states(ahead, inertia, at)
-        trouble = _slopes(ahead, flight, steady, at, rows, direction, slope[stage])
-        if stage == 0:
-            add_forces(joints, which, rows.impulse, direction, 1.0, flight.start)
-            _note_wrenches(ahead, rows, flight.value)
-            _remember(joints, which, rows, memory)
-        add_forces(joints, which, rows.impulse, direction, _END[stage], flight.mean)
+        trouble = _take(island, flight, stages, steady, h, stage)
         if trouble != 0.0:
             return trouble
-    error = _take_end(y, slope, h, flight.size, at)
-    _write_states(ahead, inertia, at)
-    _end(ahead, flight.held, rows, direction, inertia)
+    return _finish(island, flight, stages, h)
+
+
+@jit_making_arrays
+def _ahead(island, flight):
+    """The island where the flight is."""
+    return JointedIsland(
+        island.joints, island.which, flight.bodies, flight.rotation, island.members, island.number, island.memory, island.allowed
+    )
+
+
+@jit_making_arrays
+def _begin(island, flight, stages, h):
+    """Place flight.bodies where the members are; returns whether their rows can be flown with for h s."""
+    members = island.members
+    for k in range(members.shape[0]):
+        island.number[members[k]] = k
+        _read_state(island.bodies, members[k], stages.start[k])
+    _place_supports(island, flight)
+    for j in island.which:
+        for r in range(3):
+            flight.start[j, r] = flight.mean[j, r] = 0.0
+    ahead = _ahead(island, flight)
+    _write_states(ahead, island.memory.trial.inertia, stages.start)
+    copy_matrix(stages.start, stages.at)
+    return _choose_rows(ahead, flight.held, stages.rows, stages.direction, h)
+
+
+@jit_making_arrays
+def _take(island, flight, stages, steady, h, stage):
+    """Slopes at a stage, where flight.bodies are, and on to the next one; returns the trouble of `_slopes`."""
+    ahead, rows, direction, joints, which = _ahead(island, flight), stages.rows, stages.direction, island.joints, island.which
+    trouble = _slopes(ahead, flight, steady, stages.at, rows, direction, stages.slope[stage])
+    if stage == 0:
+        add_forces(joints, which, rows.impulse, direction, 1.0, flight.start)
+        _note_wrenches(ahead, rows, flight)
+        _remember(joints, which, rows, island.memory)
+    add_forces(joints, which, rows.impulse, direction, _END[stage], flight.mean)
+    if stage + 1 < STAGES:
+        for k in range(island.members.shape[0]):
+            for c in range(13):
+                step = 0.0
+                for s in range(stage + 1):
+                    step += _STAGE[stage + 1, s] * stages.slope[s, k, c]
+                stages.at[k, c] = stages.start[k, c] + h * step
+        _write_states(ahead, island.memory.trial.inertia, stages.at)
+    return trouble
+
+
+@jit_making_arrays
+def _finish(island, flight, stages, h):
+    """Bring flight.bodies to the end by the slopes of all stages; returns the error."""
+    ahead, inertia = _ahead(island, flight), island.memory.trial.inertia
+    error = _take_end(stages.start, stages.slope, h, flight.size, stages.at)
+    _write_states(ahead, inertia, stages.at)
+    _end(ahead, flight.held, stages.rows, stages.direction, inertia)
     return error
 
 
@@ -289,11 +376,15 @@ def _remember(joints, which, rows, memory):
 
 @jit_making_arrays
 def _choose_rows(ahead, held, rows, direction, h):
-    """Mark the rows that hold; coordinates and rates at the start are remembered. Returns whether the others carry nothing."""
+    """Mark the rows that hold; coordinates and rates at the start are remembered.
+
+    Returns whether the others are springs or carry nothing.
+    """
     joints, memory, count = ahead.joints, ahead.memory, rows.bias.shape[0]
-    value, u, i = np.empty(count), np.empty(count), 0
+    value, u, weight, i = np.empty(count), np.empty(count), np.empty(count), 0
     joint_rows(ahead, rows, np.int64(0), value, direction)
     relative_point_velocity(ahead, direction, u)
+    joint_weights(joints, ahead.which, rows, np.int64(0), weight)
     for j in ahead.which:
         for k in range(joints.first[j], joints.first[j + 1]):
             memory.start_value[k], memory.start_rate[k], side = value[i], u[i], limit_side(joints, k)
@@ -303,8 +394,10 @@ def _choose_rows(ahead, held, rows, direction, h):
             taut = taut and not (hard and side * u[i] * h > STILL * ahead.allowed)
             memory.slack[k] = side != 0.0 and not taut
             held[k] = hard and (taut or (joints.lower[k] == -inf and joints.upper[k] == inf))
-            memory.active[k] = held[k]
-            if not (held[k] or memory.slack[k]) or (taut and abs(u[i]) * h > STILL * ahead.allowed):
+            memory.weight[k] = weight[i]
+            is_spring = not hard and side == 0.0
+            memory.active[k] = held[k] or is_spring
+            if not (memory.active[k] or memory.slack[k]) or (taut and abs(u[i]) * h > STILL * ahead.allowed):
                 return False
             i += 1
     return True
@@ -322,6 +415,27 @@ def _hold_rows(ahead, held, rows):
 
 
 @jit_making_arrays
+def _press_springs(ahead, rows, value, direction):
+    """Give the rows of springs, dampers and drives their forces; value (s,): coordinates less targets."""
+    joints, count, i, soft = ahead.joints, rows.bias.shape[0], 0, False
+    for j in ahead.which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            soft = soft or joints.stiffness[k] < inf
+    if not soft:
+        return
+    u, weight = np.empty(count), np.empty(count)
+    relative_point_velocity(ahead, direction, u)
+    joint_weights(joints, ahead.which, rows, np.int64(0), weight)
+    for j in ahead.which:
+        for k in range(joints.first[j], joints.first[j + 1]):
+            if joints.stiffness[k] < inf and not ahead.memory.slack[k]:
+                stiffness, damping = spring_of(joints, k, weight[i])
+                pull = -stiffness * value[i] - damping * (u[i] - joints.rate[k])
+                rows.lower[i] = rows.upper[i] = rows.impulse[i] = min(max(pull, joints.lower[k]), joints.upper[k])
+            i += 1
+
+
+@jit_making_arrays
 def _slopes(ahead, flight, steady, y, rows, direction, slope):
     """Write the slopes (n, 13) of the state y (n, 13), where the members are; rows.impulse: the forces of the rows, start and answer.
 
@@ -329,18 +443,24 @@ def _slopes(ahead, flight, steady, y, rows, direction, slope):
     """
     joints, bodies, members = ahead.joints, ahead.bodies, ahead.members
     count, value, change, spin = rows.bias.shape[0], np.empty(rows.bias.shape[0]), np.empty(rows.bias.shape[0]), np.empty(3)
+    pull = np.empty(3)
     _changes_of_rates(ahead, y, change)
     joint_rows(ahead, rows, np.int64(0), value, direction)
     _hold_rows(ahead, flight.held, rows)
+    _press_springs(ahead, rows, value, direction)
     for k in range(members.shape[0]):
         i, (w0, w1, w2), (q0, q1, q2, q3) = members[k], (y[k, 10], y[k, 11], y[k, 12]), (y[k, 3], y[k, 4], y[k, 5], y[k, 6])
         gyroscopic_acceleration(ahead.rotation[i], ahead.memory.trial.inertia[i], bodies.angular_velocity[i], (0.0, 0.0, 0.0), spin)
+        t0, t1, t2 = flight.load[i, 3], flight.load[i, 4], flight.load[i, 5]
+        for c in range(3):
+            spin[c] += bodies.inv_inertia[i, c, 0] * t0 + bodies.inv_inertia[i, c, 1] * t1 + bodies.inv_inertia[i, c, 2] * t2
+            pull[c] = steady[i, c] + bodies.inv_mass[i] * flight.load[i, c]
         d0, d1, d2, d3 = product(0.0, w0, w1, w2, q0, q1, q2, q3)
         slope[k, 3], slope[k, 4], slope[k, 5], slope[k, 6] = 0.5 * d0, 0.5 * d1, 0.5 * d2, 0.5 * d3
         for c in range(3):
-            slope[k, c], slope[k, 7 + c], slope[k, 10 + c] = y[k, 7 + c], steady[i, c], spin[c]
+            slope[k, c], slope[k, 7 + c], slope[k, 10 + c] = y[k, 7 + c], pull[c], spin[c]
             # Rates of accelerations: the bodies have no other velocities for a moment.
-            bodies.velocity[i, c], bodies.angular_velocity[i, c] = steady[i, c], spin[c]
+            bodies.velocity[i, c], bodies.angular_velocity[i, c] = pull[c], spin[c]
     relative_point_velocity(ahead, direction, value)
     largest = TINY
     for i in range(count):
@@ -426,14 +546,14 @@ def _fastest(ahead):
 
 
 @jit_making_arrays
-def _note_wrenches(ahead, rows, wrench):
-    """Write the wrenches (n, 6) of the rows' forces on the members."""
+def _note_wrenches(ahead, rows, flight):
+    """Write the wrenches of the rows' forces, and of those that vary, on the members."""
     y = np.empty((ahead.members.shape[0], 6))
     multiply_transposed(rows, rows.impulse, y)
     for k in range(ahead.members.shape[0]):
         i = ahead.members[k]
-        wrench[i] = 0.0
-        scaled_wrench(ahead.bodies, i, y[k], wrench[i])
+        flight.value[i] = flight.load[i]
+        scaled_wrench(ahead.bodies, i, y[k], flight.value[i])
 
 
 @jit_making_arrays

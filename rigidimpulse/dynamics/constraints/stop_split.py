@@ -1,4 +1,4 @@
-"""Stop split: a sub-step ends where the first slip stops, as friction changes there.
+"""Slips over a sub-step: it ends where the first one stops, as friction changes there; until then friction turns with the slip.
 
 A slip is a velocity s (2,) along a pair of rows: the slip of a contact, its roll, or its spin (one row). What slips now goes on to slip
 until it stops, so that only the load N of its friction is unknown: with d = s / |s| its direction now
@@ -14,6 +14,9 @@ s' = a_t + W_t f and is smallest at
 
 The same forces are held until the first such time. Where several points share a load in many ways each way has its own friction and its
 own stop: the solver, from no impulse on, takes loads of least norm, which change smoothly with the state.
+
+Where no slip stops, but one turns, its friction has the direction of its middle, d = (s_0 + s_1) / |s_0 + s_1|. The end s_1 is that under
+the laws as they are, with friction against s_1: so d is off by O(h^2), and what slips along a bend is of second order.
 """
 
 from math import inf, sqrt
@@ -24,6 +27,9 @@ import numpy as np
 from rigidimpulse.core.kernels import jit, jit_making_arrays
 from rigidimpulse.dynamics.constraints.rolling_friction import add_rolling_slips
 from rigidimpulse.dynamics.constraints.rows import SLIDE, response_to
+
+STRAIGHT: float = 1e-12
+"""Turn of a slip, rad, that counts as none."""
 
 
 class Slips(NamedTuple):
@@ -72,6 +78,19 @@ def any_stops(rows, n, slips, none):
         if abs(end[k, 0]) + abs(end[k, 1]) <= none or start[k, 0] * end[k, 0] + start[k, 1] * end[k, 1] < 0.0:
             return True
     return False
+
+
+@jit_making_arrays
+def middle_of_slips(rows, n, slips):
+    """The slips with the mean of their velocities at the start and at the end, and whether one of them turns on the way."""
+    start, middle, turns = slips.velocity, end_slips(rows, n, slips), False
+    for k in range(middle.shape[0]):
+        across = abs(start[k, 0] * middle[k, 1] - start[k, 1] * middle[k, 0])
+        square = start[k, 0] * start[k, 0] + start[k, 1] * start[k, 1]
+        turns = turns or across > STRAIGHT * square
+        for c in range(2):
+            middle[k, c] = 0.5 * (start[k, c] + middle[k, c])
+    return Slips(slips.first, slips.second, middle), turns
 
 
 @jit_making_arrays

@@ -153,6 +153,20 @@ class ForceLog:
         self.work[i] += self._total[rows, 6].sum() - before
         self._begun[i] = time
 
+    def add(self, members: np.ndarray, end: float, done: np.ndarray) -> None:
+        """Members were moved to `end` [s] from where their lines ended; done (k, 7): what each row did on the way.
+
+        No frame is on it, save by round-off at its start.
+        """
+        for i in members.tolist():
+            rows, first = self._rows[i], int(self._written[i])
+            last = int(np.searchsorted(self._times, end, side="left"))
+            self.at_frames[first:last, rows] = self._total[rows]
+            self._written[i] = max(first, last)
+            self._total[rows] += done[rows]
+            self.work[i] += done[rows, 6].sum()
+            self._begun[i] = end
+
     def keep(self, count: int) -> None:
         """Leave the first `count` frames only."""
         self._times, self.at_frames = self._times[:count], self.at_frames[:count]

@@ -13,8 +13,25 @@ import math
 
 import numpy as np
 
-from rigidimpulse.dynamics.constraints.joint_flight import fly, length_that_follows, make_flight
-from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland
+from rigidimpulse.dynamics.constraints.joint_flight import (
+    BEGIN,
+    END,
+    MOST_TRIALS,
+    MOVE,
+    PATHS,
+    STAGE_TIMES,
+    STAGES,
+    Stages,
+    fly,
+    length_that_follows,
+    make_flight,
+    make_stages,
+    next_length,
+    take_stage,
+)
+from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, count_joint_rows
+from rigidimpulse.dynamics.constraints.rows import make_rows
+from rigidimpulse.engine.flight_forces import FlightForces
 from rigidimpulse.model.joint_table import Joints
 from rigidimpulse.model.world import World
 
@@ -52,20 +69,22 @@ class JointFlights:
         self.flight = make_flight(world.inv_mass, world.joint_size, len(table.body_a), len(table.coordinate))
         self._at_end = AT_END * world.accuracy.tolerance
         self._missed = max(MISSED, world.accuracy.tolerance)
-        self._on_the_way = ON_THE_WAY * world.accuracy.tolerance**0.5 * world.joint_size
+        self._size = world.joint_size
+        self._on_the_way = ON_THE_WAY * world.accuracy.tolerance**0.5 * self._size
         self._worth = WORTH * world.accuracy.step
         self.too_short = False
         joint_of_row = np.repeat(np.arange(len(table.body_a)), np.diff(table.first))
         holds = np.isinf(table.stiffness) & np.isinf(table.lower) & np.isinf(table.upper)
         is_limit = (table.lower == 0.0) != (table.upper == 0.0)
-        self._hard = np.bincount(joint_of_row[~(holds | is_limit)], minlength=len(table.body_a)) == 0
+        can_fly = holds | is_limit | np.isfinite(table.stiffness)
+        self._can_fly = np.bincount(joint_of_row[~can_fly], minlength=len(table.body_a)) == 0
         self._pause = np.zeros(len(table.body_a), np.int64)
         self._plan, self._step, self._path = np.full((3, len(table.body_a)), np.inf)
 
     def may_fly(self, which: np.ndarray) -> bool:
-        """Whether to try a flight of an island with these joints: no spring or motor is in it, and none was given up just before."""
+        """Whether to try a flight of an island with these joints: no hard motor is in it, and none was given up just before."""
         self._pause[which] -= 1
-        return bool(self._hard[which].all()) and int(self._pause[which].max()) < 0
+        return bool(self._can_fly[which].all()) and int(self._pause[which].max()) < 0
 
     def is_longer(self, which: np.ndarray, rest: float) -> bool:
         """Whether `rest` s takes the island of these joints several flights."""
@@ -75,23 +94,84 @@ class JointFlights:
         """Length of a last flight, whose path is laid, s: what its errors allow, and no more than what paths missed lately."""
         return min(float(self._plan[which].min()), float(self._path[which].min()))
 
-    def fly_past(self, jointed: JointedIsland, steady: np.ndarray, rest: float) -> float:
+    def fly_past(self, jointed: JointedIsland, steady: np.ndarray, forces: FlightForces | None, rest: float) -> float:
         """Move the bodies of an island that is alone to the start of the last flight of `rest` s; returns how far that is away, s.
 
         steady: (n, 3) m/s2. flight.mean has the mean forces on the way.
         """
         which = jointed.which
         last, plan = self._last(which), float(self._step[which].min())
-        pieces = self._at_end, last if math.isinf(plan) else plan
-        flown, self._step[which], _ = fly(jointed, self.flight, steady, rest - last, pieces)
+        plan = last if math.isinf(plan) else plan
+        if forces is None:
+            flown, self._step[which], _ = fly(jointed, self.flight, steady, rest - last, (self._at_end, plan))
+        else:
+            flown, self._step[which] = self._fly_past_with(forces, jointed, steady, rest - last, plan)
         return flown
 
-    def fly(self, jointed: JointedIsland, steady: np.ndarray, rest: float, other: float) -> float:
-        """Fly an island over `rest` s at most, under steady accelerations (n, 3); returns for how long.
+    def _fly_past_with(
+        self, forces: FlightForces, jointed: JointedIsland, steady: np.ndarray, span: float, plan: float
+    ) -> tuple[float, float]:
+        """`fly_past` of the kernel under forces that vary: they are asked for at each stage."""
+        which, angle = jointed.which, jointed.memory.angle
+        flown, trials, total = 0.0, 0, np.zeros_like(self.flight.mean)
+        while flown < span and trials < MOST_TRIALS:
+            pieces = math.ceil((span - flown) / plan)
+            h, before = (span - flown) / pieces, angle.copy()
+            stages = self._stages(jointed)
+            error = self._take_stages(stages, jointed, steady, forces, h)
+            if not math.isfinite(error) or forces.share_until_break() < 1.0:
+                angle[:] = before
+                break
+            done, plan = next_length(h, plan, error / self._at_end)
+            if not done:
+                angle[:] = before
+                trials += 1
+                continue
+            trials = 0
+            take_stage(jointed, self.flight, stages, steady, h, MOVE)
+            total[which] += h * self.flight.mean[which]
+            flown = span if pieces == 1 else flown + h
+            forces.move_on(h)
+        if flown > 0.0:
+            self.flight.mean[which] = total[which] / flown
+        return flown, plan
 
-        0 where that cannot be done, or not for so long that it is worth it; other: s, length of a sub-step of the other method.
+    def _stages(self, jointed: JointedIsland) -> Stages:
+        """Working memory of a step of an island."""
+        rows = make_rows.py_func(int(count_joint_rows.py_func(jointed.joints, jointed.which)))
+        return make_stages.py_func(len(jointed.members), rows)
+
+    def _take_stages(self, stages: Stages, jointed: JointedIsland, steady: np.ndarray, forces: FlightForces, h: float) -> float:
+        """Take the stages of a step of h s under forces that vary; returns its error, see `fly_jointed`."""
+        members, flight = jointed.members, self.flight
+        forces.begin(h)
+        error, _, _ = take_stage(jointed, flight, stages, steady, h, BEGIN)
+        for stage in range(STAGES):
+            if error != 0.0:
+                return error
+            flight.load[members] = forces.at(float(STAGE_TIMES[stage]), flight.bodies, flight.rotation)[members]
+            error, _, _ = take_stage(jointed, flight, stages, steady, h, stage)
+            flight.load[members] = 0.0
+        return error if error != 0.0 else take_stage(jointed, flight, stages, steady, h, END)[0]
+
+    def _take(self, jointed: JointedIsland, steady: np.ndarray, forces: FlightForces | None, h: float) -> tuple[float, float, float]:
+        """Fly an island for h s; returns what `fly_jointed` does. Forces that vary are asked for at each stage."""
+        if forces is None:
+            return fly(jointed, self.flight, steady, h, WHOLE)
+        stages, angle, is_open, missed = self._stages(jointed), jointed.memory.angle.copy(), 0.0, 0.0
+        error = self._take_stages(stages, jointed, steady, forces, h)
+        if math.isfinite(error):
+            _, is_open, missed = take_stage(jointed, self.flight, stages, steady, h, PATHS)
+            is_open = max(is_open, self._size * forces.off())
+        jointed.memory.angle[:] = angle
+        return error, is_open, missed
+
+    def fly(self, jointed: JointedIsland, steady: np.ndarray, forces: FlightForces | None, lengths: tuple[float, float]) -> float:
+        """Fly an island under steady accelerations (n, 3) and forces that vary, if there are any; returns for how long.
+
+        0 where that cannot be done, or not for so long that it is worth it. lengths: s, at most, and of a sub-step of the other method.
         """
-        which, members, flight = jointed.which, jointed.members, self.flight
+        which, members, (rest, other) = jointed.which, jointed.members, lengths
         plan = float(self._plan[which].min())
         if math.isinf(plan):
             fastest = float(np.sqrt((jointed.bodies.angular_velocity[members] ** 2).sum(1).max()))
@@ -101,7 +181,7 @@ class JointFlights:
         h = rest / math.ceil(rest / most) if most < rest else rest
         error = 0.0
         while h >= min(least, rest):
-            error, is_open, missed = fly(jointed, flight, steady, h, WHOLE)
+            error, is_open, missed = self._take(jointed, steady, forces, h)
             if not math.isfinite(error):
                 break
             if missed > self._missed:

@@ -17,7 +17,8 @@ from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, make
 from rigidimpulse.dynamics.constraints.rolling_friction import Rolling
 from rigidimpulse.dynamics.constraints.rows import make_rows
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
-from rigidimpulse.engine.exact.trajectories import account_contact_work
+from rigidimpulse.engine.exact.trajectories import account_contact_work, work_of_forces
+from rigidimpulse.engine.flight_forces import FlightForces
 from rigidimpulse.engine.islands import is_alone
 from rigidimpulse.engine.loads import load_over
 from rigidimpulse.engine.run import Run
@@ -49,6 +50,8 @@ CENTRED: float = 1e-6
 """Arm of a joint, over the length of its rod or string, up to which the body hangs at its centre."""
 HALF = 0.5
 """Part of the forces of RATTLE's sub-steps that their end leaves."""
+SURGE = 2.0
+"""By how much forces that vary may grow while nobody looks at what they move."""
 LANDING: float = 1e-9
 """Part of a flight by which it may miss the time at which a limit is reached."""
 MOST_HALVED = 5
@@ -231,13 +234,15 @@ class JointState:
 
     def _land(self, run: Run, island: Island, elapsed: np.ndarray) -> None:
         """End the island's flight, as it was planned: its joints are closed and stopped already."""
-        which, members = island.joints, island.members
+        which, members, constants, now = island.joints, island.members, run.world.constants, run.state.now
         self._record_impulses(which, island.time)
+        energy = mechanical_energy(now, constants, members)
         if self._limited:
             stop_at_limits(self._jointed(run, island), self.shock)
+            landed, energy = energy, mechanical_energy(now, constants, members)
+            run.log.account(island.time, "joints", energy - landed)
         self.length[which] = elapsed[which]
-        constants, now = run.world.constants, run.state.now
-        self._note_drift(which, mechanical_energy(now, constants, members), kinetic_energy(now, constants, members))
+        self._note_drift(which, energy, kinetic_energy(now, constants, members))
 
     def _note_drift(self, which: np.ndarray, energy: float, kinetic: float) -> None:
         """What the sub-step that ends has made or lost of the energy that joints keep by themselves."""
@@ -345,7 +350,7 @@ class JointState:
     ) -> tuple[float, float]:
         """Forces into run.wrench over a sub-step of at most `rest`; returns (its length, the residual)."""
         state, memory = run.state, self.memory
-        if not len(contacts.gap) and island.free is None and (flown := self._fly(run, island, rest)) > 0.0:
+        if not len(contacts.gap) and (flown := self._fly(run, island, rest)) > 0.0:
             return flown, 0.0
         others = self.bodies_of(island.joints)
         others = others[~run.world.dynamic[others]]
@@ -394,9 +399,14 @@ class JointState:
         whole, which = 0.0, island.joints
         if not self.flights.may_fly(which):
             return 0.0
-        end = island.time + rest
-        past = self._fly_past(run, island, min(rest, frame))
-        rest, frame = end - island.time, frame - past
+        forces, end = None, island.time + rest
+        if island.free is not None:
+            forces = run.forces.of_flight(run, island)
+            if forces is None:
+                return 0.0
+            frame = min(frame, forces.longest)
+        frame -= self._fly_past(run, island, forces, min(rest, frame))
+        rest = end - island.time
         for _ in range(MOST_CUTS):
             which = island.joints
             if not len(which):
@@ -404,7 +414,8 @@ class JointState:
             if run.world.moving[self.bodies_of(which)].any() or np.any(waits[which] <= 0.0):
                 return 0.0
             rest = max(min(rest, frame, float(waits[which].min())), SHORT * run.world.accuracy.step)
-            h = self.flights.fly(self._jointed(run, island), run.acceleration, rest, self.sub_step(run, island, rest))
+            lengths = rest, self.sub_step(run, island, rest)
+            h = self.flights.fly(self._jointed(run, island), run.world.steady_acceleration, forces, lengths)
             if h == 0.0:
                 if self.flights.too_short:
                     # They turn fast, and what drifts is not known.
@@ -417,10 +428,17 @@ class JointState:
             # Where a limit is reached the flight is made shorter, and then longer again by what it was too short.
             whole = max(whole, h)
             ends = min(next_switch(self.table, which, self.memory, (h, whole), self._allowed), self._overload_time(which, whole))
+            if forces is not None and (share := forces.share_until_break()) < 1.0:
+                ends = min(ends, share * h)
             if abs(ends - h) <= LANDING * h or (h < rest and ends > h):
                 break
             rest = max(ends, SHORT * run.world.accuracy.step)
         run.wrench[members], run.wrench_rate[members] = flight.value[members], flight.rate[members]
+        if forces is not None:
+            forces.keep()
+            pushed, island.loaded = members[run.forces.acts[members]], True
+            run.wrench[pushed] -= run.forces.value[pushed]
+            run.wrench_rate[pushed] -= run.forces.rate[pushed]
         self.memory.wrench[members] = 0.0
         self.log.note(island.time, which, self.pull[which])
         self._begin(run, island)
@@ -428,7 +446,7 @@ class JointState:
         self._open_by, self.are_closed = 0.0, True
         return h
 
-    def _fly_past(self, run: Run, island: Island, rest: float) -> float:
+    def _fly_past(self, run: Run, island: Island, forces: FlightForces | None, rest: float) -> float:
         """Move an island that is alone to the start of its last flight of `rest` s, where nothing else can happen to it; returns how far.
 
         What is recorded of the way is its mean force, and the work of the joints on each body.
@@ -436,15 +454,20 @@ class JointState:
         which, members, time = island.joints, island.members, island.time
         eventful = self._has_limit[which] | np.isfinite(self.break_force[which]) | np.isfinite(self.release_time[which])
         watched = bool(run.plan.observe) or run.soft_bodies.moves or run.world.moving[self.bodies_of(which)].any()
-        if watched or eventful.any() or not self.flights.is_longer(which, rest) or not is_alone(run, members, rest):
+        push = 0.0 if forces is None else SURGE * forces.push
+        if watched or eventful.any() or not self.flights.is_longer(which, rest) or not is_alone(run, members, rest, push):
             return 0.0
         now, constants = run.state.now, run.world.constants
-        before = [mechanical_energy(now, constants, members[k : k + 1]) for k in range(len(members))]
         for i in members.tolist():
+            run.forces.log.end(i, time, now)
             account_contact_work(run, i, time)
-        past = self.flights.fly_past(self._jointed(run, island), run.acceleration, rest)
+        before = [mechanical_energy(now, constants, np.array([i])) - work_of_forces(run, i) for i in members.tolist()]
+        past = self.flights.fly_past(self._jointed(run, island), run.world.steady_acceleration, forces, rest)
+        if forces is not None and past > 0.0:
+            forces.note(time + past)
         for i, begun in zip(members.tolist(), before, strict=True):
-            run.log.add_stretch(time, time + past, i, begun, mechanical_energy(now, constants, np.array([i])) - begun, True)
+            after = mechanical_energy(now, constants, np.array([i])) - work_of_forces(run, i)
+            run.log.add_stretch(time, time + past, i, begun, after - begun, True)
         self.log.add(which, np.full(len(which), time), np.full(len(which), time + past), self.flights.flight.mean[which])
         island.time = time + past
         return past

@@ -172,8 +172,8 @@ def gap_errors(problem, turning, estimate, wrench, h):
     """Errors (m,) of the gaps of the held contacts after h [m] under the wrenches (n, 6)."""
     contacts, acceleration, spin_rate = problem.contacts, estimate.end_acceleration, estimate.end_angular_acceleration
     for c in range(contacts.gap.shape[0]):
-        _stand(estimate, problem.bodies, contacts.body_a[c])
-        _stand(estimate, problem.bodies, contacts.body_b[c])
+        _stand(estimate, problem, contacts.body_a[c], h)
+        _stand(estimate, problem, contacts.body_b[c], h)
     for i in problem.members:
         _go_on(estimate.trajectory, problem, wrench, i)
     bring_all(estimate.trajectory, problem.members, h, estimate.end, estimate.end_rotation, acceleration, spin_rate)
@@ -193,13 +193,14 @@ def gap_errors(problem, turning, estimate, wrench, h):
 
 
 @jit
-def _stand(estimate, bodies, i):
-    """Body i at the end as it is now: the velocities of those that are no members are constant."""
-    end = estimate.end
+def _stand(estimate, problem, i, h):
+    """Body i after h s as it is now: those that are no members keep their spin, and prescribed ones their acceleration."""
+    end, bodies = estimate.end, problem.bodies
     for k in range(3):
         end.position[i, k] = bodies.position[i, k]
-        end.velocity[i, k], end.angular_velocity[i, k] = bodies.velocity[i, k], bodies.angular_velocity[i, k]
-        estimate.end_acceleration[i, k] = estimate.end_angular_acceleration[i, k] = 0.0
+        pull = problem.acceleration[i, k] if bodies.inv_mass[i] == 0.0 else 0.0
+        end.velocity[i, k], end.angular_velocity[i, k] = bodies.velocity[i, k] + h * pull, bodies.angular_velocity[i, k]
+        estimate.end_acceleration[i, k], estimate.end_angular_acceleration[i, k] = pull, 0.0
         for j in range(3):
             estimate.end_rotation[i, k, j] = estimate.rotation[i, k, j]
     for k in range(4):

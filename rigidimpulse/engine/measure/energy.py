@@ -71,9 +71,11 @@ REMEDY = "use a smaller step, or contact_solver='newton' where islands are sub-s
 """Tried on a jointed board that falls (`drawbridge` of the newcomers): 1.4e-4 of what moves by default, 1.1e-5 at a step of 1/240 s."""
 
 
-def taking_causes(world: World, may_be_sub_stepped: bool) -> frozenset[str]:
-    """Causes that may only take energy in this scene."""
-    return frozenset() if np.any(world.moving) else _taking_beside_supports(world, may_be_sub_stepped)
+def _taking_causes(record: RunRecord) -> frozenset[str]:
+    """Causes that may only take energy in this run: what has been let go was a support that moved."""
+    if np.any(record.world.moving) or record.release.any():
+        return frozenset()
+    return _taking_beside_supports(record.world, record.may_be_sub_stepped)
 
 
 def _taking_beside_supports(world: World, may_be_sub_stepped: bool) -> frozenset[str]:
@@ -98,7 +100,7 @@ def _joints_give(world: World) -> bool:
 
 def energy_rise(record: RunRecord) -> tuple[np.ndarray, float]:
     """Rise (f,) J over its least value so far, of the first balance or of the second, whichever is larger; and S, J."""
-    ledger, takes = record.ledger, taking_causes(record.world, record.may_be_sub_stepped)
+    ledger, takes = record.ledger, _taking_causes(record)
     given, all_causes = ledger.total.copy(), ledger.total.copy()
     dynamic = record.world.dynamic
     still = 0.5 * record.world.mass[dynamic] @ record.unseen_speed[dynamic] ** 2

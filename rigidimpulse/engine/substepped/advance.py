@@ -643,7 +643,13 @@ class SubsteppedIslands:
                 run.state.trajectory, moving, time, run.state.now, run.state.rotation, run.acceleration,
                 run.angular_acceleration,
             )  # fmt: skip
+        # In sub-steps supports go on parabolas: with the acceleration that brings them to where they are at the end.
+        now, before = run.state.now, run.acceleration[moving].copy()
+        for i in moving[before.any(axis=1)].tolist():
+            missed = run.pose_matrix(i, time + ahead)[0] - now.position[i] - ahead * now.velocity[i]
+            run.acceleration[i] = 2.0 * missed / ahead**2
         self.stepper.load(run, members, fixed, ahead, kept, fineness)
+        run.acceleration[moving] = before
 
     def begin_trajectories(self, run: Run, pair_events: PairEvents) -> None:
         """Give the members the trajectories that the solver found."""

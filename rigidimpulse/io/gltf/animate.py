@@ -31,10 +31,12 @@ from rigidimpulse.io.gltf.nodes import Hierarchy
 from rigidimpulse.io.gltf.origin import Origin
 from rigidimpulse.io.keys import Keys
 from rigidimpulse.io.keys import Path as BodyPath
-from rigidimpulse.io.motion import Motion
+from rigidimpulse.io.motion import Motion, check_options
 
 if TYPE_CHECKING:
-    from rigidimpulse.recording.exporters import ExportTarget
+    from pathlib import Path
+
+    from rigidimpulse.recording.exporters import ExportOptions, ExportTarget
     from rigidimpulse.recording.recording import Recording
 
 logger = logging.getLogger("rigidimpulse")
@@ -51,6 +53,13 @@ WARNINGS = "rigidimpulse warnings"
 """Key of the warnings in the extras of scenes."""
 
 
+def check_gltf(path: Path, options: ExportOptions, _scene: Any = None) -> None:
+    """See `Exporter.check`."""
+    check_options(options)
+    if (options.up_axis, options.unit) != (None, 1.0):
+        raise SceneError(f"up_axis or unit for {path.name!r}", "glTF is Y up and in metres: leave them out, or write USD")
+
+
 def write_gltf(run: Recording, target: ExportTarget) -> None:
     """Write a .glb or .gltf file of a run.
 
@@ -62,9 +71,6 @@ def write_gltf(run: Recording, target: ExportTarget) -> None:
 
     """
     options = target.options
-    if (options.up_axis, options.unit) != (None, 1.0):
-        name = f"{target.title}{target.path.suffix}"
-        raise SceneError(f"up_axis or unit for {name!r}", "glTF is Y up and in metres: leave them out, or write USD")
     motion = Motion(run, options)
     paths, scene = motion.paths, motion.scene
     origin = scene.origin if isinstance(scene.origin, Origin) else None

@@ -1,8 +1,8 @@
 """Animated nodes as keyframes: the rigid frame of a node whose own or whose parents' transforms have channels.
 
 Keys are taken at the times of all channels of the chain of nodes; where more than one node turns, or a channel is not
-linear, also every `BETWEEN` s, since what is in between is no even motion there. STEP channels move over the last
-`BETWEEN` s before a key: a jump has no velocity to push with.
+linear, also every `BETWEEN` s and where that is not enough, since what is in between is no even motion there. STEP channels
+move over the last `BETWEEN` s before a key: a jump has no velocity to push with.
 """
 
 from __future__ import annotations
@@ -13,11 +13,10 @@ import numpy as np
 
 from rigidimpulse.core.quaternion import multiply, quaternion_continuity, to_matrix
 from rigidimpulse.io.gltf.nodes import Hierarchy, Local
-from rigidimpulse.io.keys import Keys
+from rigidimpulse.io.keys import MOST_KEYS, Keys, refined
 from rigidimpulse.scene.keyframes import Keyframes
 
 BETWEEN = 1.0 / 60.0
-MOST_KEYS = 1_000_000
 PATHS = {"translation": 3, "rotation": 4, "scale": 3}
 
 
@@ -181,5 +180,6 @@ class Animations:
             before = np.concatenate([track.times[1:] - np.minimum(BETWEEN, np.diff(track.times)) for _, track in used])
             times = np.unique(np.concatenate([times, between, before]))
             times = times[np.concatenate([[True], np.diff(times) > 1e-9])]
+            return Keyframes(*refined(times, lambda at: self.frames(node, at)[:2]))
         x, q, _ = self.frames(node, times)
         return Keyframes(times, x, quaternion_continuity(q))

@@ -5,8 +5,10 @@ from __future__ import annotations
 import copy
 import mimetypes
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from rigidimpulse.core.errors import SceneError
 from rigidimpulse.io.gltf.animation import Animations
 from rigidimpulse.io.gltf.container import Builder
 from rigidimpulse.scene.body import Body
@@ -26,6 +28,11 @@ class Origin(FileOrigin):
     animations: Animations
     node_of: dict[str, int]
     parts: frozenset[str]
+
+    def check_target(self, path: Path) -> None:
+        """See `FileOrigin`: motion is written into a copy of this file."""
+        if self.animations.hierarchy.file.path.resolve() == path.resolve():
+            raise SceneError(f"{path.name!r} is the file that the scene comes from", "give another name: the file stays as it is")
 
     def as_seen(self, bodies: list[Body]) -> list[Body]:
         """Return bodies with the meshes of their nodes as visuals."""

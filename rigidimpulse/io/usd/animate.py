@@ -19,7 +19,7 @@ import numpy as np
 from rigidimpulse.core.errors import SceneError
 from rigidimpulse.core.quaternion import from_matrix
 from rigidimpulse.io.keys import Keys
-from rigidimpulse.io.motion import Motion
+from rigidimpulse.io.motion import Motion, check_options
 from rigidimpulse.io.usd.draw import Drawing, draw_soft_body
 from rigidimpulse.io.usd.layer import TYPES, attribute, define, order, place, quaternions, sample, valid_name, vectors
 from rigidimpulse.io.usd.library import Gf, Layer, PrimSpec, Sdf, SdfPath, Tf, UsdUtils, Vt, cause_of
@@ -29,7 +29,9 @@ from rigidimpulse.view.camera import stage_rotation, up_axis
 from rigidimpulse.view.materials import color
 
 if TYPE_CHECKING:
-    from rigidimpulse.recording.exporters import ExportTarget
+    from pathlib import Path
+
+    from rigidimpulse.recording.exporters import ExportOptions, ExportTarget
     from rigidimpulse.recording.recording import Recording
 
 NEAR = 1e-9
@@ -38,6 +40,13 @@ LONE_FPS = 24.0
 """Frames per second of a run of one frame."""
 IS_AXIS = 1e-9
 AXES = {"y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}
+
+
+def check_usd(_path: Path, options: ExportOptions, scene: Any = None) -> None:
+    """See `Exporter.check`."""
+    check_options(options)
+    if isinstance(getattr(scene, "origin", None), UsdOrigin) and (options.up_axis, options.unit) != (None, 1.0):
+        raise SceneError("up_axis or unit for a file that the scene came from", "leave them out: they are those of that file")
 
 
 def write_usd(run: Recording, target: ExportTarget) -> None:
@@ -98,8 +107,6 @@ class _Writer:
         self.layer.timeCodesPerSecond = self.layer.framesPerSecond = self.fps
         self.layer.startTimeCode, self.layer.endTimeCode = first, first + len(self.run.times) - 1
         if isinstance(origin, UsdOrigin):
-            if (self.motion.options.up_axis, self.motion.options.unit) != (None, 1.0):
-                raise SceneError("up_axis or unit for a file that the scene came from", "leave them out: they are those of that file")
             origin.write_over(self.layer, self.fps, first)
             with Sdf.ChangeBlock():
                 self._over(origin)

@@ -2,16 +2,16 @@
 
     position, orientation    of the prim, its scale goes to its colliders
     velocity                 in the space that the prim's own transform is in: that of its parent
-    mass                     that of the body, else of its colliders, else from densities: of the body, of the collider, of its
+    mass                     that of the body, else of its colliders, else from densities: of the collider, of the body, of the
                              material, else 1,000 kg/m^3
+    centre of mass, inertia  those of the body, else the sum over its colliders: what each says itself, else of its shape
     not enabled              static; kinematic along its time samples if it has any
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,11 +20,20 @@ from rigidimpulse.core.quaternion import from_matrix
 from rigidimpulse.engine.triggers import Trigger
 from rigidimpulse.io.inertia import with_possible_inertia
 from rigidimpulse.io.looks import visual_of
-from rigidimpulse.io.pieces import DENSITY, GHOST, Piece, fill_mass, joined, weighed
+from rigidimpulse.io.pieces import DENSITY, GHOST, Piece, Weight, fill_mass, joined, moved_unit, summed, weight_of
 from rigidimpulse.io.usd.frames import Frames
 from rigidimpulse.io.usd.library import Prim, SdfPath, UsdGeom, UsdPhysics
 from rigidimpulse.io.usd.looks import looks_of
-from rigidimpulse.io.usd.materials import Filters, Units, given_mass, positive, read_material
+from rigidimpulse.io.usd.materials import (
+    Filters,
+    Units,
+    bound_materials,
+    combined_otherwise,
+    given_mass,
+    positive,
+    read_material,
+    weight_given,
+)
 from rigidimpulse.io.usd.shapes import Shapes, placed_in
 from rigidimpulse.scene.body import Body
 from rigidimpulse.scene.keyframes import Keyframes
@@ -55,11 +64,13 @@ class BodyReader:
         self.name_of: dict[SdfPath, str] = {}
         self.triggers: list[Trigger] = []
         self._materials: dict[SdfPath, tuple[Material, float]] = {}
+        self._bound: dict[SdfPath, SdfPath] = {}
         self._rigid = dict(parsed.get("RigidBody", []))
         self.colliders = [entry for kind, entries in parsed.items() if kind.endswith("Shape") for entry in entries]
         # In the order of the file, whatever their kind.
         place = {prim.GetPath(): k for k, prim in enumerate(frames.prims())}
         self.colliders.sort(key=lambda entry: place.get(entry[0], 0))
+        self._bound = bound_materials([self.stage.GetPrimAtPath(path) for path, _ in self.colliders])
         self._names = _Names()
         self._make(place)
 
@@ -95,6 +106,7 @@ class BodyReader:
                 raise error if "prim " in error.where else error.within(f"prim {path}") from None
         for path, desc in later:
             self._add_trigger(path, desc)
+        self.notes += combined_otherwise({path: material for path, (material, _) in self._materials.items()})
 
     def _below(self, path: SdfPath) -> set[str]:
         """Names of the bodies that a path is, or that are below it, or above it."""
@@ -104,10 +116,10 @@ class BodyReader:
     def _body(self, path: SdfPath, name: str, owned: list[tuple[SdfPath, Any]], filter_: Any) -> Body:
         """Return the body of a prim."""
         prim, desc = self.stage.GetPrimAtPath(path), self._rigid.get(path)
-        pieces, masses, densities = self._pieces(prim, owned)
+        pieces, given = self._pieces(prim, owned)
         if not pieces:
             self.notes.append(f"body {name!r} has no collider that is read: it touches nothing")
-            pieces, masses, densities, filter_ = [GHOST], [None], [DENSITY], GHOST.collision_filter
+            pieces, given, filter_ = [GHOST], [_Given({}, DENSITY, np.zeros(3), np.eye(3))], GHOST.collision_filter
         if any(piece.material != pieces[0].material for piece in pieces):
             self.notes.append(f"body {name!r} has colliders of several materials: that of the first counts")
         position, rotation = self.frames.rigid(prim)
@@ -122,7 +134,7 @@ class BodyReader:
         elif desc is not None and enabled:
             values |= {"motion": "kinematic" if desc.kinematicBody else "dynamic", **self._velocities(prim)}
             if not desc.kinematicBody:
-                values |= self._weight(prim, name, pieces, masses, densities)
+                values |= self._weight(prim, name, pieces, given)
                 if self.frames.moves(prim):
                     self.notes.append(f"body {name!r} is animated and moved by physics: its animation is not read")
             if desc.startsAsleep:
@@ -134,12 +146,12 @@ class BodyReader:
         body = Body(name, joined(pieces), material=material, collision_filter=filter_, visual=visual, **values)
         return with_possible_inertia(body, self.notes)
 
-    def _pieces(self, prim: Prim, owned: list[tuple[SdfPath, Any]]) -> tuple[list[Piece], list[float | None], list[float]]:
-        """Return colliders in the rigid frame of a body's prim, their own masses (kg) and densities (kg/m^3)."""
+    def _pieces(self, prim: Prim, owned: list[tuple[SdfPath, Any]]) -> tuple[list[Piece], list[_Given]]:
+        """Return colliders in the rigid frame of a body's prim, and what the file says of the mass of each."""
         pieces: list[Piece] = []
-        masses: list[float | None] = []
-        densities: list[float] = []
-        own = given_mass(prim, self.units, np.eye(3)).get("density")
+        masses: list[_Given] = []
+        own = given_mass(prim, self.units, np.eye(3), self.notes).get("density")
+        origin, frame = self.frames.rigid(prim)
         for path, desc in owned:
             collider = self.stage.GetPrimAtPath(path)
             placed = self._placed(collider, prim)
@@ -147,12 +159,12 @@ class BodyReader:
                 continue
             if any(self.frames.is_animated(above) for above in _between(collider, prim)):
                 self.notes.append(f"collider {path} is animated against its body: it stays as it is at rest")
-            material, density = self._material(desc.materials)
-            given = given_mass(collider, self.units, np.eye(3)) if collider != prim else {}
+            material, density = self._material(path, desc.materials)
+            given = given_mass(collider, self.units, self.frames.stretch(collider), self.notes) if collider != prim else {}
+            place, turn = self.frames.rigid(collider)
             pieces.append(Piece(*placed, material, None))
-            masses.append(given.get("mass"))
-            densities.append(own or given.get("density") or density or DENSITY)
-        return pieces, masses, densities
+            masses.append(_Given(given, given.get("density") or own or density or DENSITY, frame.T @ (place - origin), frame.T @ turn))
+        return pieces, masses
 
     def _placed(self, collider: Prim, prim: Prim) -> tuple[Any, np.ndarray, np.ndarray] | None:
         """Return shape, position and orientation of a collider in the rigid frame of a prim."""
@@ -161,9 +173,9 @@ class BodyReader:
             return None
         return placed_in(made, self.frames.rigid(collider), self.frames.rigid(prim))
 
-    def _material(self, bound: Any) -> tuple[Material, float]:
-        """Return the material of a collider, and its density in kg/m^3, 0 if it says none."""
-        path = next((path for path in bound if path), None)
+    def _material(self, collider: SdfPath, parsed: Any) -> tuple[Material, float]:
+        """Return the material of a collider, and its density in kg/m^3, 0 if it says none; parsed: those that the parser found."""
+        path = self._bound.get(collider) or next((path for path in parsed if path), None)
         if path is None:
             return Material(), 0.0
         if path not in self._materials:
@@ -184,21 +196,18 @@ class BodyReader:
             frame = parent
         return {"velocity": parent @ velocity * self.units.length, "angular_velocity": frame @ np.radians(spin)}
 
-    def _weight(
-        self, prim: Prim, name: str, pieces: list[Piece], masses: Sequence[float | None], densities: list[float]
-    ) -> dict[str, Any]:
+    def _weight(self, prim: Prim, name: str, pieces: list[Piece], given: list[_Given]) -> dict[str, Any]:
         """Return mass properties of a dynamic body: those that the shape and one density do not say already."""
-        values = given_mass(prim, self.units, self.frames.stretch(prim))
+        values = given_mass(prim, self.units, self.frames.stretch(prim), self.notes)
         values.pop("density", None)
-        if not any(masses) and len(set(densities)) == 1:
-            values["density"] = densities[0]
-            fill_mass(name, joined(pieces), values, self.notes, densities[0])
+        if len({entry.density for entry in given}) == 1 and not any(entry.values.keys() - {"density"} for entry in given):
+            values["density"] = given[0].density
+            fill_mass(name, joined(pieces), values, self.notes, given[0].density)
             return values
-        found = weighed(pieces, masses, densities)
-        share = values.get("mass", found.mass) / found.mass
-        values.setdefault("mass", found.mass)
-        values.setdefault("center_of_mass", found.center_of_mass)
-        values.setdefault("inertia", share * found.inertia)
+        found = summed([entry.weight(piece) for entry, piece in zip(given, pieces, strict=True)])
+        mass = values.setdefault("mass", found.mass)
+        way = values.setdefault("center_of_mass", found.center_of_mass) - found.center_of_mass
+        values.setdefault("inertia", mass / found.mass * found.inertia + mass * moved_unit(way))
         return values
 
     def _add_trigger(self, path: SdfPath, desc: Any) -> None:
@@ -219,6 +228,19 @@ class BodyReader:
                 return self.name_of[prim.GetPath()]
             prim = prim.GetParent()
         return None
+
+
+class _Given(NamedTuple):
+    """What the file says of the mass of a collider: values of its MassAPI, density kg/m^3, its own frame in that of its body."""
+
+    values: dict[str, Any]
+    density: float
+    position: np.ndarray
+    rotation: np.ndarray
+
+    def weight(self, piece: Piece) -> Weight:
+        """Mass properties of the collider."""
+        return weight_given(weight_of(piece, self.values.get("mass"), self.density), self.values, self.position, self.rotation)
 
 
 class _Names:

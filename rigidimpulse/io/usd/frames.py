@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from rigidimpulse.core.errors import SceneError
-from rigidimpulse.core.quaternion import from_matrix, quaternion_continuity
+from rigidimpulse.core.quaternion import from_matrix
+from rigidimpulse.io.keys import MOST_KEYS, refined
 from rigidimpulse.io.usd.library import Prim, Stage, Usd, UsdGeom
 
 EVEN = 1e-6
@@ -21,6 +22,7 @@ EVEN = 1e-6
 ORTHOGONAL = 1e-9
 FLAT = 1e-9
 """Determinant over the product of the lengths of columns, below which a matrix flattens space."""
+QUARTER_TURN = 0.5 * np.pi
 LARGEST = 1e9
 """m, greatest number that makes sense."""
 SNAP = 1e-12
@@ -95,19 +97,49 @@ class Frames:
         """Times (k,) s after the first time code, positions (k, 3) m and quaternions (k, 4) wxyz of a prim that moves.
 
         Args:
-            prim: it. between: s, longest time from key to key: transforms in between are no even motion.
+            prim: it. between: s, longest time from key to key: transforms in between are no even motion. Keys are nearer where the
+                prim turns by more than a quarter turn in that time, or where the way of its origin is bent.
 
         """
         codes = np.array(self._codes(prim))
         step = between * self.codes_per_second
         count = int((codes[-1] - codes[0]) / step) + 1
-        codes = np.unique(np.concatenate([codes, codes[0] + step * np.arange(1, count)]))
-        codes = codes[np.concatenate([[True], np.diff(codes) > 1e-6 * step])]
+        all_codes = np.unique(np.concatenate([codes, codes[0] + step * np.arange(1, count)]))
+        all_codes = all_codes[np.concatenate([[True], np.diff(all_codes) > 1e-6 * step])]
+        parts = np.maximum(np.ceil(self._turns(prim, all_codes) / QUARTER_TURN), 1.0)
+        if parts.sum() > MOST_KEYS:
+            raise SceneError(f"its animation takes {parts.sum():.3g} keys", "shorten it, or let it turn less", f"prim {prim.GetPath()}")
+        share = np.concatenate([np.zeros(0), *(np.arange(int(part)) / part for part in parts)])
+        first = np.repeat(np.arange(len(parts)), parts.astype(int))
+        all_codes = np.append(all_codes[first] + share * np.diff(all_codes)[first], all_codes[-1])
+        keys = refined((all_codes - self.start) / self.codes_per_second, lambda times: self._poses(prim, times))
+        return keys.times, keys.positions, keys.orientations
+
+    def _turns(self, prim: Prim, codes: np.ndarray) -> np.ndarray:
+        """Bounds (k - 1,) rad of the turns of a prim between time codes (k,), by the angles on it and on what is above it.
+
+        Quaternions turn the shorter way from sample to sample.
+        """
+        turns = np.zeros(len(codes) - 1)
+        while prim and not prim.IsPseudoRoot():
+            xform = UsdGeom.Xformable(prim)
+            for operation in xform.GetOrderedXformOps() if xform else ():
+                if operation.MightBeTimeVarying() and "rotate" in operation.GetOpName():
+                    angles = np.array([operation.Get(code) for code in codes.tolist()], float).reshape(len(codes), -1)
+                    turns += np.radians(np.abs(np.diff(angles, axis=0)).sum(axis=1))
+            if xform and xform.GetResetXformStack():
+                break
+            prim = prim.GetParent()
+        return turns
+
+    def _poses(self, prim: Prim, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (k, 3) m and quaternions (k, 4) wxyz of a prim at times (k,) s after the first time code."""
+        codes = times * self.codes_per_second + self.start
         places, turns = np.zeros((len(codes), 3)), np.zeros((len(codes), 4))
         for k, code in enumerate(codes.tolist()):
             matrix = self._checked(UsdGeom.XformCache(Usd.TimeCode(code)), prim)
             places[k], turns[k] = matrix[:3, 3] * self.meters_per_unit, from_matrix(rotation_of(matrix[:3, :3]))
-        return (codes - self.start) / self.codes_per_second, places, quaternion_continuity(turns)
+        return places, turns
 
 
 def rotation_of(linear: np.ndarray) -> np.ndarray:

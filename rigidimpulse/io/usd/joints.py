@@ -65,8 +65,8 @@ class JointReader:
             self.notes.append(f"joint {name!r} is not enabled: left out")
             return None
         api = UsdPhysics.Joint(prim)
-        a, anchor_a, axes_a = self._side(api.GetBody0Rel(), api.GetLocalPos0Attr(), api.GetLocalRot0Attr())
-        b, anchor_b, axes_b = self._side(api.GetBody1Rel(), api.GetLocalPos1Attr(), api.GetLocalRot1Attr())
+        a, anchor_a, axes_a = self._side(name, api.GetBody0Rel(), api.GetLocalPos0Attr(), api.GetLocalRot0Attr())
+        b, anchor_b, axes_b = self._side(name, api.GetBody1Rel(), api.GetLocalPos1Attr(), api.GetLocalRot1Attr())
         if a == b or not any(self.bodies[k].motion == "dynamic" for k in (a, b) if k is not None):
             self.notes.append(f"joint {name!r} joins nothing that moves ({a!r} and {b!r}): left out")
             return None
@@ -80,7 +80,7 @@ class JointReader:
             break_force=strength, collide=collide,
         )  # fmt: skip
 
-    def _side(self, rel: Any, place: Any, turn: Any) -> tuple[str | None, np.ndarray, np.ndarray]:
+    def _side(self, name: str, rel: Any, place: Any, turn: Any) -> tuple[str | None, np.ndarray, np.ndarray]:
         """Return the body of a side, None for the world, its anchor (3,) m and axes (3, 3) in rows, in the world."""
         frames, targets = self.reader.frames, rel.GetTargets()
         local, given = np.array(place.Get() or (0, 0, 0), float), turn.Get()
@@ -88,6 +88,8 @@ class JointReader:
         length = float(np.linalg.norm(quaternion))
         rotation = to_matrix(quaternion / length) if length > 1e-6 else np.eye(3)
         prim = frames.stage.GetPrimAtPath(targets[0]) if targets else None
+        if targets and not prim:
+            self.notes.append(f"joint {name!r}: {rel.GetName()} is {targets[0]}, and there is no such prim: it counts as the world")
         if not prim:
             return None, local * frames.meters_per_unit, rotation.T
         matrix = frames.matrix(prim)

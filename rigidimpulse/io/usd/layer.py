@@ -48,10 +48,12 @@ def attribute(prim: PrimSpec, name: str, kind: Any, value: Any = None, uniform: 
 
 
 def quaternions(orientations: np.ndarray) -> Any:
-    """Return orientations (k, 4) wxyz as USD has them, in single precision."""
-    single = np.ascontiguousarray(orientations[:, [1, 2, 3, 0]], np.float32)
-    # Rounded to single precision and made unit again: USD does not.
-    return Vt.QuatfArray.FromNumpy(np.ascontiguousarray(single / np.linalg.norm(single.astype(float), axis=1, keepdims=True), np.float32))
+    """Return orientations (k, 4) wxyz as USD has them, in double precision.
+
+    USD takes the angle from the real part alone: rounded to single precision it loses turns below 1e-3 rad.
+    """
+    turned = np.asarray(orientations, float)[:, [1, 2, 3, 0]]
+    return Vt.QuatdArray.FromNumpy(np.ascontiguousarray(turned / np.linalg.norm(turned, axis=1, keepdims=True)))
 
 
 def vectors(points: np.ndarray) -> Any:
@@ -63,7 +65,7 @@ def place(prim: PrimSpec, position: np.ndarray, orientation: np.ndarray, suffix:
     """Give a prim a position and an orientation wxyz, and return the names of their operations."""
     names = f"xformOp:translate{suffix}", f"xformOp:orient{suffix}"
     attribute(prim, names[0], TYPES.Double3, vectors(np.reshape(position, (1, 3)))[0])
-    attribute(prim, names[1], TYPES.Quatf, quaternions(np.reshape(orientation, (1, 4)))[0])
+    attribute(prim, names[1], TYPES.Quatd, quaternions(np.reshape(orientation, (1, 4)))[0])
     return names
 
 

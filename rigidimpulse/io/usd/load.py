@@ -64,7 +64,7 @@ def _scene(stage: Stage, gravity: ArrayLike | None) -> Scene:
     notes = expand_instancers(stage, frames.start)
     parsed = _parsed(stage)
     reader = BodyReader(frames, parsed)
-    notes += _unresolved(stage) + _unknown(frames)
+    notes += _unresolved(stage) + _unknown(frames) + _stray_masses(reader, frames)
     if not reader.bodies:
         plain = plain_bodies(frames)
         reader = BodyReader(frames, plain.parsed, plain.hulls)
@@ -115,6 +115,13 @@ def _unknown(frames: Frames) -> list[str]:
         names = [str(name).split(":")[0] for name in prim.GetPrimTypeInfo().GetAppliedAPISchemas()]
         count.update(name for name in {*names, str(prim.GetTypeName())} if name.startswith(FOREIGN) and name not in READ)
     return [f"{name} of {number} {'prim' if number == 1 else 'prims'} is not read" for name, number in sorted(count.items())]
+
+
+def _stray_masses(reader: BodyReader, frames: Frames) -> list[str]:
+    """Return lines about mass properties of prims that are neither a body nor a collider: they hold for nothing below them."""
+    taken = {path for path, _ in reader.colliders} | set(reader.name_of)
+    stray = [str(prim.GetPath()) for prim in frames.prims() if prim.HasAPI(UsdPhysics.MassAPI) and prim.GetPath() not in taken]
+    return [f"{_listed(stray)}: no body and no collider, the PhysicsMassAPI there is not read"] if stray else []
 
 
 def _drawn_only(reader: BodyReader, frames: Frames) -> list[str]:

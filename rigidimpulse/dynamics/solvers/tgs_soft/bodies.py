@@ -73,7 +73,7 @@ def load_bodies(bodies, order, now, load, inv_mass, part):
             bodies.position[k, c] = now.position[i, c]
             bodies.velocity[8 * k + c] = now.velocity[i, c]
             bodies.velocity[8 * k + 3 + c] = now.angular_velocity[i, c]
-            bodies.gravity[k, c] = acceleration[i, c] if part[i] == MEMBER else 0.0
+            bodies.gravity[k, c] = acceleration[i, c] if part[i] == MEMBER or inv_mass[i] == 0.0 else 0.0
             bodies.torque[k, c] = torque[i, c] if part[i] == MEMBER else 0.0
         for c in range(4):
             bodies.orientation[k, c] = now.orientation[i, c]

@@ -106,14 +106,18 @@ def _turn_evenly(bodies, i, h):
 
 @jit
 def kick(bodies, begin, end, h):
-    """Let gravity and the torque of forces act over h s on the bodies from `begin` to `end`."""
+    """Let gravity and the torque of forces act over h s on the bodies from `begin` to `end`; supports get what their paths gain."""
     v, before = bodies.velocity, bodies.before
     for i in range(begin, end):
-        if bodies.part[i] != MEMBER:
+        if bodies.part[i] == OUTSIDE:
             continue
         o = 8 * i
         for k in range(3):
-            v[o + k] += h * bodies.gravity[i, k]
+            # Adding nothing could still turn -0 into 0.
+            if bodies.part[i] == MEMBER or bodies.gravity[i, k] != 0.0:
+                v[o + k] += h * bodies.gravity[i, k]
+        if bodies.part[i] != MEMBER:
+            continue
         if is_twisted(bodies, i):
             x, y, z = _spin_up(bodies, i, h)
             t = bodies.torque[i]
@@ -127,7 +131,7 @@ def kick(bodies, begin, end, h):
 
 @jit
 def move(bodies, begin, end, h):
-    """Move the bodies from `begin` to `end` by their velocities over h s; those that no contact pushed, on their parabola."""
+    """Move the bodies from `begin` to `end` by their velocities over h s; those that no contact pushed, and supports, on their parabola."""
     v, before, moved, drift = bodies.velocity, bodies.before, bodies.moved, bodies.drift
     for i in range(begin, end):
         if bodies.part[i] == OUTSIDE:
@@ -138,7 +142,7 @@ def move(bodies, begin, end, h):
         loose = member
         for k in range(6):
             loose = loose and v[o + k] == before[o + k]
-        back = 0.5 * h * h if loose else 0.0
+        back = 0.5 * h * h if loose or not member else 0.0
         for k in range(3):
             step = h * v[o + k] - back * bodies.gravity[i, k]
             bodies.position[i, k] += step
