@@ -189,7 +189,7 @@ def lively(now: BodyState, strength: np.ndarray, inner: np.ndarray) -> np.ndarra
 
 def roll(world: World, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Which pairs (k,) bool of bodies a and b (k,) have rolling or spinning friction, in a scene with some."""
-    return world.rolling[world.material_of_body[a], world.material_of_body[b]].any(axis=1)
+    return np.any(world.rolling[world.material_of_body[a], world.material_of_body[b]], axis=1)
 
 
 def unlike(world: World, a: np.ndarray, b: np.ndarray) -> np.ndarray:
