@@ -92,8 +92,8 @@ def test_springs_of_a_joint_keep_energy_at_large_angles(joint: object) -> None:
     np.testing.assert_allclose(total, total[0], rtol=2e-4)
 
 
-def test_spring_at_a_hinge_off_the_centre_is_of_second_order() -> None:
-    """theta'' = -k theta / I about the hinge; errors at steps of 1/120, 1/240, 1/480 s, in which it turns by less than 0.02 rad."""
+def test_spring_at_a_hinge_off_the_centre_does_not_know_the_step() -> None:
+    """theta'' = -k theta / I about the hinge, in flights of order 8; sub-steps of second order were off by 2.6e-4 at 1/120 s."""
     inertia, errors = MASS / 12 * (0.09 + 0.04) + MASS * 0.16, []
     for step in (1 / 120, 1 / 240, 1 / 480):
         scene = ri.Scene(gravity=(0, 0, 0))
@@ -104,9 +104,7 @@ def test_spring_at_a_hinge_off_the_centre_is_of_second_order() -> None:
         run = ri.simulate(scene, 2.0, accuracy=ri.Accuracy(step=step))
         exact = 2 * np.cos(np.sqrt(6.0 / inertia) * run.times)
         errors.append(np.abs(run.angular_velocity("arm")[:, 2] - exact).max())
-    # 2.6e-4, 6.4e-5, 1.6e-5; of first order before, with 1e-2.
-    assert errors[0] < 5e-4
-    np.testing.assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), 2.0, atol=0.2)
+    assert max(errors) < 1e-10, errors
 
 
 def test_hanging_chain_of_a_hundred_links_bears_a_thousandfold_ball() -> None:

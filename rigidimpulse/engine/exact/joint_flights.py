@@ -10,6 +10,7 @@ flown past in steps of the method, inside one kernel.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,9 +32,11 @@ from rigidimpulse.dynamics.constraints.joint_flight import (
 )
 from rigidimpulse.dynamics.constraints.jointed_island import JointedIsland, count_joint_rows
 from rigidimpulse.dynamics.constraints.rows import make_rows
-from rigidimpulse.engine.flight_forces import FlightForces
 from rigidimpulse.model.joint_table import Joints
 from rigidimpulse.model.world import World
+
+if TYPE_CHECKING:
+    from rigidimpulse.engine.flight_forces import FlightForces
 
 AT_END, ON_THE_WAY = 3.0, 1.0
 """Errors of a flight, relative to the size of what joints join: at its end in tolerances of the accuracy, on the way in roots of them.
@@ -45,6 +48,8 @@ WORK, MOST_WORK = 0.1, 3.0
 WORTH = 1.0 / 2048.0
 """Part of the run's step for which a flight is always worth it. The other method is of second order: with 1/32, whips of a double pendulum
 were left to it, and 3e-4 of the energy was made, at a higher cost."""
+SPRUNG = 1.0 / 16.0
+"""The same where a soft row is overdamped, or at the only joint: the other method has the closed form of each, however stiff it is."""
 MISSED: float = 1e-11
 """rad, by which paths may end elsewhere than flights; the tolerance of the accuracy, if that is more: a gyroscope at
 "preview" flew in a third of the length that its error allowed, and took longer than at "standard"."""
@@ -71,9 +76,10 @@ class JointFlights:
         self._missed = max(MISSED, world.accuracy.tolerance)
         self._size = world.joint_size
         self._on_the_way = ON_THE_WAY * world.accuracy.tolerance**0.5 * self._size
-        self._worth = WORTH * world.accuracy.step
-        self.too_short = False
         joint_of_row = np.repeat(np.arange(len(table.body_a)), np.diff(table.first))
+        self._soft = np.flatnonzero(np.isfinite(table.stiffness))
+        self._joint_of_soft, self._step_of_run = joint_of_row[self._soft], world.accuracy.step
+        self.too_short = False
         holds = np.isinf(table.stiffness) & np.isinf(table.lower) & np.isinf(table.upper)
         is_limit = (table.lower == 0.0) != (table.upper == 0.0)
         can_fly = holds | is_limit | np.isfinite(table.stiffness)
@@ -93,6 +99,14 @@ class JointFlights:
     def _last(self, which: np.ndarray) -> float:
         """Length of a last flight, whose path is laid, s: what its errors allow, and no more than what paths missed lately."""
         return min(float(self._plan[which].min()), float(self._path[which].min()))
+
+    def _worth(self, jointed: JointedIsland) -> float:
+        """Length of a flight that is always worth it, s."""
+        table, soft = jointed.joints, self._soft[np.isin(self._joint_of_soft, jointed.which)]
+        # c^2 W > 4 k, or c^2 > 4 k where both are those of a unit of mass.
+        square = table.damping[soft] ** 2 * np.where(table.per_mass[soft], 1.0, jointed.memory.weight[soft])
+        sprung = len(soft) > 0 and (len(jointed.which) == 1 or bool(np.any(square > 4.0 * table.stiffness[soft])))
+        return (SPRUNG if sprung else WORTH) * self._step_of_run
 
     def fly_past(self, jointed: JointedIsland, steady: np.ndarray, forces: FlightForces | None, rest: float) -> float:
         """Move the bodies of an island that is alone to the start of the last flight of `rest` s; returns how far that is away, s.
@@ -176,7 +190,7 @@ class JointFlights:
         if math.isinf(plan):
             fastest = float(np.sqrt((jointed.bodies.angular_velocity[members] ** 2).sum(1).max()))
             plan = FIRST_TURN / fastest if fastest > 0.0 else np.inf
-        least = min(1.0 + WORK * len(members), MOST_WORK) * min(other, self._worth)
+        least = min(1.0 + WORK * len(members), MOST_WORK) * min(other, self._worth(jointed))
         most = min(plan, float(self._path[which].min()))
         h = rest / math.ceil(rest / most) if most < rest else rest
         error = 0.0

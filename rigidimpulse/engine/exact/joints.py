@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from rigidimpulse.dynamics.constraints.rolling_friction import Rolling
 from rigidimpulse.dynamics.constraints.rows import make_rows
 from rigidimpulse.dynamics.energy import kinetic_energy, mechanical_energy
 from rigidimpulse.engine.exact.trajectories import account_contact_work, work_of_forces
-from rigidimpulse.engine.flight_forces import FlightForces
 from rigidimpulse.engine.islands import is_alone
 from rigidimpulse.engine.loads import load_over
 from rigidimpulse.engine.run import Run
@@ -32,6 +32,9 @@ from rigidimpulse.recording.joint_log import JointLog
 from rigidimpulse.scene.fastening import fastening
 from rigidimpulse.scene.joint import Joint
 from rigidimpulse.scene.joint_coordinates import DISTANCE, RADIUS
+
+if TYPE_CHECKING:
+    from rigidimpulse.engine.flight_forces import FlightForces
 
 BEYOND = TOLERANCES.sub_stepping.joints_open
 """By how much joints may be beyond a limit at the start, of the size of what they join, until that is reported."""
