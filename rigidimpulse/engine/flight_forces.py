@@ -42,7 +42,7 @@ class FlightForces:
         self.longest, self.push = bounds
         self._forces, self._now, self._time = forces, run.state.now, island.time
         self._members = island.members[forces.acts[island.members]]
-        self._h, self._flown, self._done = 0.0, 0.0, np.zeros((0, 7))
+        self._h, self._flown, self._done = 0.0, 0.0, np.zeros(())
         self._powers: list[np.ndarray] = []
         self._rows: list[np.ndarray] = []
         self._sums: list[np.ndarray] = []
@@ -64,14 +64,13 @@ class FlightForces:
 
     def move_on(self, h: float) -> None:
         """The members were moved to the end of this flight of h s; the next one begins there."""
-        done = h * np.tensordot(STAGE_WEIGHTS, np.stack(self._powers), 1)
-        self._done = done if self._flown == 0.0 else self._done + done
+        self._done = self._done + h * np.tensordot(STAGE_WEIGHTS, np.stack(self._powers), 1)
         self._flown += h
 
     def note(self, end: float) -> None:
         """The members have been moved to `end` [s]: what forces did on the way is recorded."""
         self._forces.log.add(self._members, end, self._done)
-        self._time, self._flown = end, 0.0
+        self._time, self._flown, self._done = end, 0.0, np.zeros(())
 
     def off(self) -> float:
         """By how much paths are off on the way, as a part of the size of bodies or in rad."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from rigidimpulse.core.portable import length
 from rigidimpulse.core.quaternion import conjugate, multiply, quaternion_from_rotation_vector, rotate, rotation_vector
+from rigidimpulse.core.tolerances import TOLERANCES
 from rigidimpulse.core.vector import cross_arrays
 from rigidimpulse.dynamics.energy import mechanical_energy
 from rigidimpulse.engine.run import Run
@@ -28,8 +29,7 @@ CUBIC: float = 1e-8
 """Part of the bounding radius by which a cubic may leave the arc."""
 MOST_TURN: float = 1.5
 """rad, of a piece."""
-TINY: float = 1e-100
-"""Stands for 0 where something is divided by it."""
+TINY = TOLERANCES.arithmetic.least_divisor
 CENTRED: float = 1e-9
 """Part of the bounding radius up to which a centre of mass is at the origin: that of a mesh is there up to round-off."""
 

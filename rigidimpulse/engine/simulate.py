@@ -70,9 +70,8 @@ def simulate(
 
     Returns:
         The recording, with round(duration * fps) + 1 frames at multiples of 1 / fps; the first is the initial state. A duration of less
-        than half of 1 / fps gives that one alone. Ctrl-C stops the run after the step that it is
-        in, or the steps that are taken at once: the recording has the frames until then, and its status is not ok and says "partial". A
-        second Ctrl-C raises KeyboardInterrupt.
+        than half of 1 / fps gives that one alone. Ctrl-C stops the run after the step that it is in, or the steps that are taken at once:
+        the recording has the frames until then, and its status is not ok and says "partial". A second Ctrl-C raises KeyboardInterrupt.
 
     Raises:
         SceneError: the scene cannot be simulated as it is; names the body, the value and the remedy. Or an effect is unknown, cannot be
