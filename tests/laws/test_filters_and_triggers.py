@@ -86,7 +86,10 @@ def test_a_shot_through_a_gate_that_hits_a_wall_in_the_same_step(restitution: fl
 
 @pytest.mark.parametrize("stiffness", [100.0, 1000.0])
 def test_a_gate_on_the_way_of_a_ball_on_a_spring(stiffness: float) -> None:
-    """x = cos(w t) in steps that many trajectories make up: to 3e-9 s, the path and the search. It was taken to go straight between those that are not the last."""
+    """x = cos(w t) in steps that many trajectories make up: to 3e-9 s, the path and the search.
+
+    It was taken to go straight between those that are not the last.
+    """
     w = math.sqrt(stiffness)
     scene = ri.Scene(gravity=(0, 0, 0), bodies=[ri.Body("ball", ri.Shape.sphere(0.05), mass=1.0, position=(1, 0, 0))])
     scene.add(ri.PDController("ball", position=(0, 0, 0), stiffness=stiffness))

@@ -115,6 +115,7 @@ UNLIKE, MOST_UNLIKE = 6.0, 96.0
 """How many times as heavy as a body one that it touches is, from which sub-steps go with the root of it, and to which: a light body bears a
 heavy one by impulses that sub-steps find bit by bit. A box under a ball of 25 times its mass was up to 5 skins inside the floor."""
 CROSSED = TOLERANCES.sub_stepping.crossed
+LOOKS_FOR = TOLERANCES.manifold.depth
 MOST_LOOKS = 1024
 """Looks for contacts in what is stepped at once that speed may ask for. Beyond that an island would cost more than it advances: a light
 rod that a heavy press had spun up to 15,000 rad/s took 60,000 sub-steps in 1/60 s. Bodies may then pass each other: the status says so."""
@@ -555,8 +556,8 @@ class ContactStepper:
     def inside_others(self, run: Run, asked: np.ndarray) -> np.ndarray:
         """Which bodies (n,) bool of those asked for, brought to the present, are inside others: the exact regime must not get them.
 
-        It moves bodies apart at once that are deep inside each other: a ball that was 3 mm inside a box pushed that through the ground. And
-        it cannot find surfaces that cross: it took a ring that lay 10 um inside a floor for one that is past it.
+        It looks for contacts down to a few contact margins of depth: a box that a turning wall pushed was deeper, and flew through it.
+        And it cannot find surfaces that cross: it took a ring that lay 10 um inside a floor for one that is past it.
         """
         out = np.zeros(self.world.num_bodies, bool)
         if not asked.any():
@@ -564,7 +565,9 @@ class ContactStepper:
         pairs, depth, mine = self.table.pairs, self.smaller.depth, asked[self.order]
         which = np.flatnonzero((mine[pairs.first] | mine[pairs.second]) & (pairs.count > 0))
         p, gap = self._gaps(which)
-        deep = p[gap < -np.minimum(self.bodies.skin[pairs.first[p]], self.bodies.skin[pairs.second[p]])]
+        a, b = self.order[pairs.first[p]], self.order[pairs.second[p]]
+        seen = LOOKS_FOR * self.world.margins.contact * np.minimum(self.world.size[a], self.world.size[b])
+        deep = p[gap < -np.minimum(seen, np.minimum(self.bodies.skin[pairs.first[p]], self.bodies.skin[pairs.second[p]]))]
         out[self.order[np.append(pairs.first[deep], pairs.second[deep])]] = True
         out &= asked
         if not depth.any():
