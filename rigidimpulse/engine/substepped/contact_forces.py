@@ -556,7 +556,7 @@ class ContactStepper:
     def inside_others(self, run: Run, asked: np.ndarray) -> np.ndarray:
         """Which bodies (n,) bool of those asked for, brought to the present, are inside others: the exact regime must not get them.
 
-        It looks for contacts down to a few contact margins of depth: a box that a turning wall pushed was deeper, and flew through it.
+        It looks for contacts up to a few contact margins deep: a box that a turning bar pushed was deeper, and flew through that.
         And it cannot find surfaces that cross: it took a ring that lay 10 um inside a floor for one that is past it.
         """
         out = np.zeros(self.world.num_bodies, bool)
